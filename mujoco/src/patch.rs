@@ -35,7 +35,7 @@ pub(super) struct Span {
 pub(super) struct PatchLayout {
     /// Model that the places belong to.
     storage: Arc<Storage>,
-    /// Arrays with a difference, in ascending order.
+    /// Arrays with a difference, in MuJoCo's order.
     fields: Box<[Field]>,
     /// Spans in ascending order.
     spans: Box<[Span]>,
@@ -75,7 +75,13 @@ pub struct ModelPatch {
     /// Words, span by span.
     values: Box<[u64]>,
     globals: Globals,
+    welded: Option<Welded>,
 }
+
+/// Origin of a patch with active welds: the differences without these welds, or `None` without differences. They come
+/// back when the welds end, with their own list of places.
+#[derive(Debug)]
+struct Welded(Option<Arc<ModelPatch>>);
 
 impl ModelPatch {
     /// Gravity in world axes \[m/s²\].
@@ -88,7 +94,8 @@ impl ModelPatch {
         let layout = size_of::<PatchLayout>() + size_of_val(&*self.layout.fields) + size_of_val(&*self.layout.spans);
         let owners = Arc::strong_count(&self.layout);
         // Two counters before the content of each `Arc`.
-        2 * size_of::<usize>() + size_of::<Self>() + size_of_val(&*self.values) + layout.div_ceil(owners)
+        let unwelded = self.welded.as_ref().and_then(|origin| origin.0.as_ref()).map_or(0, |patch| patch.bytes());
+        2 * size_of::<usize>() + size_of::<Self>() + size_of_val(&*self.values) + layout.div_ceil(owners) + unwelded
     }
 
     /// Calls `visit` for the numbers that the patch has of an array of `f64`, with their indices.
@@ -112,7 +119,8 @@ impl ModelPatch {
     }
 
     /// The differences `patch` of `model` and these active welds, besides those that are active from the start. Welds
-    /// that `patch` contains end. If a weld is listed twice, the last pose counts. `None` if there is no difference.
+    /// that an earlier call added to `patch` end. If a weld is listed twice, the last pose counts. `None` if there is no
+    /// difference.
     ///
     /// On 4.x, the active flags are in the data: call [`Data::set_equality_active`](crate::Data::set_equality_active)
     /// too.
@@ -123,35 +131,40 @@ impl ModelPatch {
         for weld in welds {
             assert!(model.is_weld(weld.equality), "equality {} is not a weld", weld.equality);
         }
-        let is_of_welds = |field: &Field| matches!(field.array.name, "eq_data" | "eq_active");
         if let Some(patch) = patch {
             patch.expect_storage(model);
-            if welds.is_empty() && !patch.layout.fields.iter().any(is_of_welds) {
-                return Some(Arc::clone(patch));
-            }
-        } else if welds.is_empty() {
-            return None;
+        }
+        let unwelded = match patch.map(|patch| &patch.welded) {
+            Some(Some(origin)) => origin.0.as_ref(),
+            _ => patch,
+        };
+        if welds.is_empty() {
+            return unwelded.cloned();
         }
         let compiled = model.compiled();
-        let mut words = PatchWords::default();
-        if let Some(patch) = patch {
+        // Words of each array by index: those of the differences, which include constants of equalities that follow from
+        // other properties, then those of the welds.
+        let mut words: BTreeMap<u32, BTreeMap<u32, u64>> = BTreeMap::new();
+        if let Some(patch) = unwelded {
             patch.for_each(|field, span, values| {
-                if !is_of_welds(field) {
-                    words.push(*field, span.at, values);
-                }
+                words.entry(field.index).or_default().extend((span.at..).zip(values.iter().copied()));
             });
         }
-        for field in fields_of(compiled).into_iter().filter(|field| is_of_welds(field) && !welds.is_empty()) {
+        let fields = fields_of(compiled);
+        for field in fields.iter().filter(|field| matches!(field.array.name, "eq_data" | "eq_active")) {
             // SAFETY: the array has this size and lives as long as the compiled model, to which nothing writes.
             let bytes = unsafe { std::slice::from_raw_parts(array_pointer(compiled, &field.array), field.array.bytes) };
-            let mut changed = BTreeMap::new();
-            for weld in welds {
-                weld.write(field.array.name, bytes, &mut changed);
-            }
-            changed.into_iter().for_each(|(at, word)| words.push(field, at, &[word]));
+            let changed = words.entry(field.index).or_default();
+            welds.iter().for_each(|weld| weld.write(field.array.name, bytes, changed));
         }
-        let globals = patch.map_or_else(|| Globals::of(compiled), |patch| patch.globals);
-        words.into_patch(model, globals)
+        let mut all = PatchWords::default();
+        for field in &fields {
+            for (at, word) in words.remove(&field.index).into_iter().flatten() {
+                all.push(*field, at, &[word]);
+            }
+        }
+        let globals = unwelded.map_or_else(|| Globals::of(compiled), |patch| patch.globals);
+        all.into_patch_of(model, globals, Some(Welded(unwelded.cloned())))
     }
 
     fn expect_storage(&self, model: &Model) {
@@ -234,12 +247,16 @@ impl PatchWords {
 
     /// Creates the patch of `model` with these words; `None` if there is no difference.
     pub(super) fn into_patch(self, model: &Model, globals: Globals) -> Option<Arc<ModelPatch>> {
+        self.into_patch_of(model, globals, None)
+    }
+
+    fn into_patch_of(self, model: &Model, globals: Globals, welded: Option<Welded>) -> Option<Arc<ModelPatch>> {
         if self.is_nominal(model, globals) {
             return None;
         }
         let storage = Arc::clone(model.storage());
         let layout = Arc::new(PatchLayout { storage, fields: self.fields.into(), spans: self.spans.into() });
-        Some(Arc::new(ModelPatch { layout, values: self.values.into(), globals }))
+        Some(Arc::new(ModelPatch { layout, values: self.values.into(), globals, welded }))
     }
 
     /// Creates the patch as [`into_patch`](Self::into_patch) does, with the places of `last` if it has few others. Then
@@ -270,7 +287,7 @@ impl PatchWords {
         };
         let mut values = Vec::with_capacity(word_count(&layout.spans));
         layout.for_each_place(|array, places| values.extend(places.map(|at| read(array, at))));
-        Some(Arc::new(ModelPatch { layout, values: values.into(), globals }))
+        Some(Arc::new(ModelPatch { layout, values: values.into(), globals, welded: None }))
     }
 
     fn is_nominal(&self, model: &Model, globals: Globals) -> bool {

@@ -4,17 +4,22 @@ use super::*;
 use kinetoscope_mujoco as mj;
 use kinetoscope_mujoco::{IntegrationState, ModelEditor, UserInputs, Weld};
 
-/// A tree of joints with a tendon and an actuator, and free bodies on the ground, two of which can be welded.
+/// A tree of joints with a tendon and an actuator, and free bodies on the ground, two of which can be welded. MuJoCo
+/// computes the anchor of the connect constraint again when the base moves, and on 2.2.2 it normalizes the quaternion of
+/// the active weld again with every change: a release of the other weld lost both.
 const SCENE: &str = r#"<mujoco><option timestep="0.003"/><worldbody><geom type="plane" size="5 5 1"/>
     <body pos="0 1 0.5"><joint type="ball" damping="0.01"/><geom type="capsule" fromto="0 0 0 0.3 0 0" size="0.03"/>
       <body pos="0.3 0 0"><joint name="hinge" axis="0 1 0" damping="0.01" armature="0.01" frictionloss="0.01"/>
         <site name="tip" pos="0.1 0 0"/><geom type="box" size="0.1 0.02 0.02" pos="0.1 0 0"/></body></body>
     <body name="a" pos="1 0 0.105"><freejoint/><geom type="box" size="0.1 0.1 0.1"/></body>
     <body name="b" pos="1 0 0.32"><freejoint/><geom type="ellipsoid" size="0.1 0.08 0.1"/></body>
-    <body pos="2 0 0"><geom type="box" size="0.3 0.3 0.02"/></body>
-    <body pos="2 0 0.2"><freejoint/><geom type="cylinder" size="0.1 0.1"/></body></worldbody>
+    <body name="base" pos="2 0 0"><geom type="box" size="0.3 0.3 0.02"/></body>
+    <body name="can" pos="2 0 0.2"><freejoint/><geom type="cylinder" size="0.1 0.1"/></body>
+    <body name="c" pos="3 0 1"><freejoint/><geom size="0.1"/></body>
+    <body name="d" pos="3.3 0 1"><freejoint/><geom size="0.1"/></body></worldbody>
     <tendon><fixed name="t" frictionloss="0.01"><joint joint="hinge" coef="1"/></fixed></tendon>
-    <equality><weld body1="a" body2="b" active="false"/></equality>
+    <equality><weld body1="a" body2="b" active="false"/><connect body1="base" body2="can" anchor="0.1 0 0"/>
+      <weld body1="c" body2="d" relpose="0.3 0 0 0.52 -1 -0.11 0.44"/></equality>
     <actuator><motor joint="hinge" gear="2"/></actuator>
     <sensor><framepos objtype="site" objname="tip"/><accelerometer site="tip"/></sensor></mujoco>"#;
 
