@@ -279,8 +279,8 @@ impl ModelEditor {
     pub fn patch(&mut self) -> Option<Arc<ModelPatch>> {
         let (words, globals) = (self.differences(), Globals::of(self.copy.header()));
         let patch = match &self.last {
-            // SAFETY: a field of models of these sizes; only `&mut self` writes to the copy.
             Some(last) => words.into_patch_like(last, &self.base, globals, |array, at| {
+                // SAFETY: a field of models of these sizes; only `&mut self` writes to the copy.
                 word(unsafe { bytes(self.copy.header(), array) }, at)
             }),
             None => words.into_patch(&self.base, globals),

@@ -102,12 +102,12 @@ fn whole_models() {
         let mut plain: Vec<mj::Data> = (0..envs).map(|_| mj::Data::new(&model).expect("small")).collect();
         let small = crate::env::with_small_buffers(&model);
         let mut batch = Batch::new(&small, &Arc::default(), envs, threads, ThreadPool::new()).expect("small");
-        for i in 0..envs {
+        for (i, plain) in plain.iter_mut().enumerate() {
             let start = |data: &mut mj::Data| {
                 data.qvel_mut().iter_mut().enumerate().for_each(|(k, v)| *v = (1.3 * i as f64 + k as f64).sin());
                 data.ctrl_mut()[0] = 0.1 * i as f64;
             };
-            start(&mut plain[i]);
+            start(plain);
             batch.write_at(i, Stage::Raw, |env| env.write_state(start));
         }
         for (block, count) in [1, 5, 30, 1, 2, 60, 9, 1].into_iter().enumerate() {

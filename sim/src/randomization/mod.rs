@@ -124,7 +124,7 @@ impl Simulation {
         tables: &Arc<PropertyTables>,
         envs: &[usize],
         mut change: impl FnMut(usize, &mut Properties) -> Result<()>,
-    ) -> Result<(Vec<PreparedChange>, Vec<(usize, PropertyOverrides)>)> {
+    ) -> Result<PreparedChanges> {
         let mut properties = self.batch.read_row(0, |row| Properties::new(tables, &NO_OVERRIDES, &row.drives));
         let (mut made, mut others) = (Vec::with_capacity(envs.len()), Vec::new());
         for &index in envs {
@@ -221,6 +221,9 @@ impl Simulation {
 
 /// Environment, and its own values and model, which are prepared.
 type PreparedChange = (usize, StoredOverrides, EnvPatch);
+
+/// All prepared environments, and the own values of those whose sizes or colors change.
+type PreparedChanges = (Vec<PreparedChange>, Vec<(usize, PropertyOverrides)>);
 
 /// Checks that own values and models of `envs` environments fit in the available memory, if each of them takes `bytes`.
 fn check_memory(envs: usize, bytes: usize, available: Option<usize>) -> Result<(), RandomizationError> {

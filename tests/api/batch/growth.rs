@@ -131,8 +131,8 @@ fn every_failing_allocation() {
 #[test]
 fn all_environments() {
     let mut sim = sim(cfg(9, 3));
-    add_plate(&mut sim, [14, 2], [1.0, 1.0, 0.4], [0.3, 0.2, 0.1]);
-    sim.update(120);
+    add_plate(&mut sim, [14, 0], [1.0, 1.0, 0.1], [0.0; 3]);
+    sim.update(60);
     let bits = all_bits(&sim);
     assert!(bits.iter().all(|env| *env == bits[0]));
     // Each of three threads that takes an environment grows its own buffers, from 16 contacts to the 196 of the plate at
