@@ -157,11 +157,19 @@ impl Data {
     /// # Panics
     /// The model was compiled separately, or its buffers have other sizes.
     pub fn set_model(&mut self, model: Model) {
+        self.replace_model(model);
+    }
+
+    /// Replaces the model as [`set_model`](Self::set_model) does, and returns the one before.
+    ///
+    /// # Panics
+    /// The model was compiled separately, or its buffers have other sizes.
+    pub fn replace_model(&mut self, model: Model) -> Model {
         assert!(
             model.is_compatible_with(&self.model),
             "the model was compiled separately, or its buffers have other sizes"
         );
-        self.model = model;
+        std::mem::replace(&mut self.model, model)
     }
 
     pub(super) fn raw(&self) -> *const mj::mjData {

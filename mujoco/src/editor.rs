@@ -1,15 +1,17 @@
 //! Models that differ from a compiled model in a few arrays and share all others with it.
 //!
 //! MuJoCo's model is one allocation. `mj_setConst`, which must follow a change of masses, writes to arrays that differ
-//! between versions. Changes are therefore made to a full copy, in which MuJoCo may write to any array. The arrays that
-//! then differ from the compiled model, byte by byte, become the own memory of a shallow model.
+//! between versions. Changes are therefore made to a full copy, in which MuJoCo may write to any array. The words in
+//! which it then differs from the compiled model, byte by byte, become a [`ModelPatch`].
 
 use super::error::EngineError;
 use super::guard::guarded;
-use super::model::{Model, OwnArray, Storage, array_pointer, set_buffers};
+use super::model::{Compiled, Model, Storage, array_pointer, set_buffers};
+use super::patch::{Field, Globals, ModelPatch, PatchLayout, PatchWords, fields_of, word};
 use mujoco_sys as mj;
 use mujoco_sys::fields::model as fields;
 use mujoco_sys::fields::model::ModelArray;
+use std::cell::OnceCell;
 use std::ptr::NonNull;
 use std::sync::Arc;
 
@@ -37,7 +39,20 @@ pub struct ModelEditor {
     base: Model,
     copy: Storage,
     scratch: Scratch,
-    fields: Vec<ModelArray>,
+    /// Arrays that are compared.
+    fields: OnceCell<Arc<[Field]>>,
+    /// Places of the last patch.
+    last: Option<Arc<PatchLayout>>,
+    /// Places outside of which the copy equals the compiled model; `None` if it may differ everywhere.
+    known: Option<Known>,
+}
+
+/// Places where the copy may differ from the compiled model.
+#[derive(Debug)]
+enum Known {
+    Nowhere,
+    /// Those of this patch.
+    Patch(Arc<PatchLayout>),
 }
 
 /// The `mjData` that `mj_setConst` works in.
@@ -60,6 +75,7 @@ macro_rules! edited_arrays {
             $(
                 #[doc = concat!("MuJoCo's array of the edited model, for writing: `", stringify!($name), "`.")]
                 $visibility fn $name(&mut self) -> &mut [$element] {
+                    self.known = None;
                     // SAFETY: the copy is alive, and `ModelEditor`, its only owner, is borrowed mutably.
                     unsafe { fields::$name(self.copy.0.as_ptr()) }
                 }
@@ -98,21 +114,14 @@ impl ModelEditor {
     /// # Errors
     /// MuJoCo cannot allocate a copy.
     pub fn new(model: &Model) -> Result<Self, EngineError> {
-        let no_memory = || EngineError { message: "could not allocate memory for a copy of the model".into() };
-        // SAFETY: the compiled model is alive and one allocation, as mj_copyModel needs it; an engine function
-        // (guarded).
-        let copy = guarded(|| unsafe { mj::mj_copyModel(std::ptr::null_mut(), model.compiled()) })?;
-        let mut copy = Storage(NonNull::new(copy).ok_or_else(no_memory)?);
+        let mut copy = Storage(copy_model(model.compiled())?);
         set_buffers(copy.header_mut(), model.small_buffers());
         // SAFETY: the copy is alive; an engine function (guarded).
         let data = guarded(|| unsafe { mj::mj_makeData(copy.0.as_ptr()) })?;
+        let no_memory = || EngineError { message: "could not allocate data for a copy of the model".into() };
         let scratch = Scratch(NonNull::new(data).ok_or_else(no_memory)?);
-        let mut fields = Vec::new();
-        let small = |name: &str| !UNCOMPARED_PREFIXES.iter().any(|prefix| name.starts_with(prefix));
-        let keep = |field: ModelArray| fields.extend((field.bytes > 0 && small(field.name)).then_some(field));
-        // SAFETY: the compiled model is alive.
-        unsafe { fields::each(model.compiled(), keep) };
-        Ok(Self { base: model.clone(), copy, scratch, fields })
+        let (fields, known) = (OnceCell::new(), Some(Known::Nowhere));
+        Ok(Self { base: model.clone(), copy, scratch, fields, last: None, known })
     }
 
     /// Replaces all edits by the arrays and the gravity of `model`.
@@ -121,21 +130,33 @@ impl ModelEditor {
     /// `model` comes from another compilation than the model of this editor.
     pub fn load(&mut self, model: &Model) {
         assert!(std::ptr::eq(model.compiled(), self.base.compiled()), "the model was compiled from another scene");
-        for field in &self.fields {
-            // SAFETY: a field of models of these sizes; nothing writes to a shared model.
-            let from = unsafe { bytes(model.header(), field) };
-            // SAFETY: the array of the copy has as many bytes, since both have the sizes of the compiled model; the
-            // copy is alive, and `self` is borrowed mutably.
-            let to = unsafe {
-                std::slice::from_raw_parts_mut(array_pointer(self.copy.header(), field).cast_mut(), field.bytes)
-            };
-            if *to != *from {
-                to.copy_from_slice(from);
+        match (self.known.take(), model.patch()) {
+            (Some(Known::Nowhere), None) => {}
+            (Some(Known::Patch(layout)), None) => {
+                layout.for_each_place(|array, places| self.load_words(model, array, 8 * places.start..8 * places.end));
+            }
+            _ => {
+                let fields = Arc::clone(self.fields());
+                fields.iter().for_each(|field| self.load_words(model, &field.array, 0..field.array.bytes));
             }
         }
-        let (header, copy) = (model.header(), self.copy.header_mut());
-        copy.opt.gravity = header.opt.gravity;
-        (copy.stat.meaninertia, copy.stat.meanmass) = (header.stat.meaninertia, header.stat.meanmass);
+        Globals::of(model.header()).write(self.copy.header_mut());
+        self.known = model.patch().is_none().then_some(Known::Nowhere);
+    }
+
+    /// Replaces a range of bytes of an array by that of `model`.
+    fn load_words(&mut self, model: &Model, array: &ModelArray, range: std::ops::Range<usize>) {
+        // SAFETY: a field of models of these sizes; nothing writes to a shared model.
+        let from = unsafe { bytes(model.header(), array) };
+        // SAFETY: the array of the copy has as many bytes, since both have the sizes of the compiled model; the copy is
+        // alive, and `self` is borrowed mutably.
+        let to =
+            unsafe { std::slice::from_raw_parts_mut(array_pointer(self.copy.header(), array).cast_mut(), array.bytes) };
+        // The last word may have fewer bytes.
+        let range = range.start..range.end.min(array.bytes);
+        if to[range.clone()] != from[range.clone()] {
+            to[range.clone()].copy_from_slice(&from[range]);
+        }
     }
 
     /// Moves the center of mass of a body to `com`, in the body's frame \[m\].
@@ -210,6 +231,7 @@ impl ModelEditor {
     /// # Errors
     /// MuJoCo reported an error (`mju_error`).
     pub fn set_constants(&mut self) -> Result<(), EngineError> {
+        self.known = None;
         let (m, d) = (self.copy.0.as_ptr(), self.scratch.0.as_ptr());
         // SAFETY: the copy and its data are alive, and `self` is borrowed mutably; an engine function (guarded).
         let done = guarded(|| unsafe { mj::mj_setConst(m, d) });
@@ -246,32 +268,73 @@ impl ModelEditor {
     /// `like` comes from another compilation.
     pub fn model(&self, like: &Model) -> Model {
         assert!(std::ptr::eq(like.compiled(), self.base.compiled()), "the model was compiled from another scene");
-        let changed = |field: &&ModelArray| {
-            // SAFETY: a field of models of these sizes; only `&mut self` writes to the copy.
-            let mine = unsafe { bytes(self.copy.header(), field) };
-            // SAFETY: as above; nothing writes to a shared model.
-            mine != unsafe { bytes(like.compiled(), field) }
-        };
-        let own: Arc<[OwnArray]> = self.fields.iter().filter(changed).map(|field| self.own(field)).collect();
-        let mut header = like.copy_header();
-        for field in &self.fields {
-            set_pointer(&mut header, field, array_pointer(like.compiled(), field));
+        match self.differences().into_patch(&self.base, Globals::of(self.copy.header())) {
+            Some(patch) => like.clone().patched(&patch),
+            None => like.without_patch(),
         }
-        for array in &*own {
-            set_pointer(&mut header, &array.field, array.memory.as_ptr().cast());
-        }
-        let copy = self.copy.header();
-        header.opt.gravity = copy.opt.gravity;
-        // mj_setConst overwrites the rest of `stat`, too, including values that the file sets.
-        (header.stat.meaninertia, header.stat.meanmass) = (copy.stat.meaninertia, copy.stat.meanmass);
-        // SAFETY: sizes are those of `like`; all pointers lead to the compiled model, which `like` keeps alive, except
-        // those that were just set to `own`, each to memory of the size of its field.
-        unsafe { like.with_arrays(header, own) }
     }
 
-    fn own(&self, field: &ModelArray) -> OwnArray {
-        // SAFETY: a field of models of these sizes; only `&mut self` writes to the copy.
-        OwnArray::from_bytes(*field, unsafe { bytes(self.copy.header(), field) })
+    /// Returns the differences of the edited model from the compiled one; `None` without any. Patches of similar edits
+    /// share the list of places, so some words of a patch may be those of the compiled model.
+    pub fn patch(&mut self) -> Option<Arc<ModelPatch>> {
+        let (words, globals) = (self.differences(), Globals::of(self.copy.header()));
+        let patch = match &self.last {
+            Some(last) => words.into_patch_like(last, &self.base, globals, |array, at| {
+                // SAFETY: a field of models of these sizes; only `&mut self` writes to the copy.
+                word(unsafe { bytes(self.copy.header(), array) }, at)
+            }),
+            None => words.into_patch(&self.base, globals),
+        };
+        self.known = Some(match &patch {
+            None => Known::Nowhere,
+            Some(patch) => {
+                self.last = Some(Arc::clone(patch.layout()));
+                Known::Patch(Arc::clone(patch.layout()))
+            }
+        });
+        patch
+    }
+
+    fn fields(&self) -> &Arc<[Field]> {
+        let is_compared = |field: &Field| !UNCOMPARED_PREFIXES.iter().any(|of| field.array.name.starts_with(of));
+        self.fields.get_or_init(|| fields_of(self.base.compiled()).into_iter().filter(is_compared).collect())
+    }
+
+    /// Collects the words in which the copy differs from the compiled model.
+    fn differences(&self) -> PatchWords {
+        let mut words = PatchWords::default();
+        for field in &**self.fields() {
+            // SAFETY: a field of models of these sizes; only `&mut self` writes to the copy.
+            let mine = unsafe { bytes(self.copy.header(), &field.array) };
+            // SAFETY: as above; nothing writes to a compiled model.
+            let compiled = unsafe { bytes(self.base.compiled(), &field.array) };
+            if mine == compiled {
+                continue;
+            }
+            for at in 0..mine.len().div_ceil(8) {
+                let value = word(mine, at);
+                if value != word(compiled, at) {
+                    words.push(*field, at as u32, &[value]);
+                }
+            }
+        }
+        words
+    }
+
+    /// Returns a whole copy of the edited model, which shares nothing, with small buffers.
+    ///
+    /// # Errors
+    /// MuJoCo cannot allocate a copy.
+    pub fn to_compiled(&self) -> Result<Compiled, EngineError> {
+        let copy = copy_model(self.copy.header())?;
+        // SAFETY: made by MuJoCo, without another owner.
+        Ok(unsafe { Compiled::from_raw(copy) })
+    }
+
+    /// Dry friction of the degrees of freedom of the edited model, (nv,).
+    pub fn dof_frictionloss(&self) -> &[f64] {
+        // SAFETY: the copy is alive, and only `&mut self` writes to it.
+        unsafe { fields::dof_frictionloss(self.copy.0.as_ptr()) }
     }
 }
 
@@ -279,6 +342,14 @@ impl ModelEditor {
 /// be moved.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct DiagonalInertia;
+
+/// Copies a model that is one allocation.
+fn copy_model(model: &mj::mjModel) -> Result<NonNull<mj::mjModel>, EngineError> {
+    // SAFETY: the model is alive and one allocation, as mj_copyModel needs it; an engine function (guarded).
+    let copy = guarded(|| unsafe { mj::mj_copyModel(std::ptr::null_mut(), model) })?;
+    let no_memory = || EngineError { message: "could not allocate memory for a copy of the model".into() };
+    NonNull::new(copy).ok_or_else(no_memory)
+}
 
 /// Clears a `sameframe` flag that refers to the inertia of the body: 2 for the inertia frame, 4 for its axes (4.x). A
 /// flag of 1 refers to the body frame.

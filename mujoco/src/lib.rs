@@ -17,7 +17,7 @@
 //! | `model`, `arrays`, `version_counts`, `options`, `name`, `weld`, `raw` | [`Model`]: sizes, arrays, options, names |
 //! | `visual`, `skin_flex` | meshes, textures, materials, lights, skins and flexes |
 //! | `data`, `state`, `ray`, `jacobian`, `prefetch` | [`Data`]: state, steps, contacts, rays, Jacobians |
-//! | `editor` | [`ModelEditor`]: models that share most arrays with a compiled model |
+//! | `editor`, `patch` | [`ModelEditor`], [`ModelPatch`]: models that share most arrays with a compiled model |
 //! | `unsupported`, `unknown_keyword`, [`mjcf_keywords`] | features by version, and MJCF keywords |
 //! | `version`, `guard`, `error`, `heap` | version check, error handler, error types, allocator |
 //!
@@ -45,6 +45,7 @@ pub mod mjcf_keywords;
 mod model;
 mod name;
 mod options;
+mod patch;
 mod plugins;
 mod prefetch;
 mod raw;
@@ -68,6 +69,7 @@ pub use heap::trim_heap;
 pub use model::{Buffers, Compiled, Model};
 pub use name::ObjectKind;
 pub use options::OptionDifference;
+pub use patch::ModelPatch;
 pub use prefetch::prefetch;
 pub use ray::RayHit;
 pub use skin_flex::{Bone, FlexArrays, SkinArrays};

@@ -1,6 +1,7 @@
 //! Compiled models: mutable until shared, then immutable.
 
 use super::data::Overflow;
+use super::patch::{ModelPatch, OwnArrays};
 use mujoco_sys as mj;
 use mujoco_sys::fields::model::{ModelArray, each};
 use std::ptr::NonNull;
@@ -60,23 +61,26 @@ impl Compiled {
         // SAFETY: a bitwise copy of the struct: its pointers lead into `storage`, which outlives it, and the copy is
         // never freed as a model (mjModel has no destructor of its own).
         let header = unsafe { std::ptr::read(self.0.0.as_ptr()) };
-        Model(Arc::new(ShallowModel { header, storage: Arc::new(self.0), own: Arc::default() }))
+        Model(Arc::new(ShallowModel { header, storage: Arc::new(self.0), own: Arc::default(), patch: None }))
     }
 }
 
-/// A shallow `mjModel`: it has its own sizes and options, and shares its arrays with the storage except for its own
-/// arrays.
+/// A shallow `mjModel`: it has its own sizes and options, and shares its arrays with the storage except for those of its
+/// patch.
 ///
 /// It is not one allocation. Functions that need one (`mj_copyModel`, `mj_saveModel`, `mj_deleteModel`) must not
 /// receive it. Functions that step or read follow its pointers and may.
 pub(super) struct ShallowModel {
-    header: mj::mjModel,
-    storage: Arc<Storage>,
-    own: Arc<[OwnArray]>,
+    /// Its pointers lead into `storage`, those of the arrays of `patch` into `own`.
+    pub(super) header: mj::mjModel,
+    pub(super) storage: Arc<Storage>,
+    pub(super) own: Arc<OwnArrays>,
+    pub(super) patch: Option<Arc<ModelPatch>>,
 }
 
-/// An array that a model does not share with its compiled model. Nothing writes to it once the model is made.
-#[derive(Clone)]
+/// An array that a model does not share with its compiled model. Only the sole owner of a model writes to it
+/// ([`Model::patched`]).
+#[derive(Clone, Debug)]
 pub(super) struct OwnArray {
     pub(super) field: ModelArray,
     /// Content, in units that are aligned for every element type.
@@ -102,8 +106,20 @@ impl std::fmt::Debug for ShallowModel {
     }
 }
 
-// SAFETY: the pointers in `header` lead into `storage` and `own_array_list`, which are Send + Sync; nothing writes
-// through them.
+impl ShallowModel {
+    /// Copies the struct alone. Its pointers lead into memory that `self` keeps alive.
+    pub(super) fn copy_header(&self) -> mj::mjModel {
+        // SAFETY: bitwise copy of a plain C struct that is never freed as a model.
+        unsafe { std::ptr::read(&self.header) }
+    }
+
+    /// The same model with a changed struct: only its buffer sizes may differ.
+    fn with_header(&self, header: mj::mjModel) -> Self {
+        Self { header, storage: Arc::clone(&self.storage), own: Arc::clone(&self.own), patch: self.patch.clone() }
+    }
+}
+
+// SAFETY: the pointers in `header` lead into `storage` and `own`, which are Send + Sync; nothing writes through them.
 unsafe impl Send for ShallowModel {}
 // SAFETY: as above.
 unsafe impl Sync for ShallowModel {}
@@ -118,7 +134,7 @@ pub(super) fn array_pointer(model: &mj::mjModel, field: &ModelArray) -> *const u
 
 /// An immutable model, cheap to clone and to share between environments and threads.
 #[derive(Clone, Debug)]
-pub struct Model(Arc<ShallowModel>);
+pub struct Model(pub(super) Arc<ShallowModel>);
 
 /// Buffer sizes of a [`Data`](super::Data) for contacts and constraints.
 ///
@@ -169,29 +185,13 @@ impl Model {
     /// shared.
     #[must_use]
     pub fn with_buffers(&self, buffers: Buffers) -> Self {
-        let mut header = self.copy_header();
+        let mut header = self.0.copy_header();
         set_buffers(&mut header, buffers);
-        Self(Arc::new(ShallowModel { header, storage: Arc::clone(&self.0.storage), own: Arc::clone(&self.0.own) }))
+        Self(Arc::new(self.0.with_header(header)))
     }
 
-    /// Copies the struct alone. Its pointers lead into memory that `self` keeps alive.
-    pub(super) fn copy_header(&self) -> mj::mjModel {
-        // SAFETY: bitwise copy of a plain C struct that is never freed as a model.
-        unsafe { std::ptr::read(&self.0.header) }
-    }
-
-    /// Returns the same model with a changed struct and its own arrays.
-    ///
-    /// # Safety
-    /// Sizes of `header` are those of `self`; every array pointer leads into the storage of `self` or into `own`, where
-    /// it has the size of its field.
-    pub(super) unsafe fn with_arrays(&self, header: mj::mjModel, own: Arc<[OwnArray]>) -> Self {
-        Self(Arc::new(ShallowModel { header, storage: Arc::clone(&self.0.storage), own }))
-    }
-
-    /// Arrays that this model does not share with the compiled model.
-    pub(super) fn own_array_list(&self) -> &[OwnArray] {
-        &self.0.own
+    pub(super) fn storage(&self) -> &Arc<Storage> {
+        &self.0.storage
     }
 
     /// The compiled model, which is one allocation.
@@ -210,7 +210,7 @@ impl Model {
             return self.clone();
         }
         assert!(Arc::ptr_eq(&self.0.storage, &like.0.storage), "the model was compiled from another scene");
-        let mut header = self.copy_header();
+        let mut header = self.0.copy_header();
         let sizes = like.header();
         (header.nconmax, header.njmax) = (sizes.nconmax, sizes.njmax);
         #[cfg(mj4)]
@@ -221,7 +221,7 @@ impl Model {
         {
             header.nstack = sizes.nstack;
         }
-        Self(Arc::new(ShallowModel { header, storage: Arc::clone(&self.0.storage), own: Arc::clone(&self.0.own) }))
+        Self(Arc::new(self.0.with_header(header)))
     }
 
     /// True if data of one model can be used with the other: both come from one compiled model, with equal buffer
@@ -239,15 +239,14 @@ impl Model {
 
     /// Names and sizes \[bytes\] of the arrays that this model does not share with the compiled model.
     pub fn own_arrays(&self) -> impl Iterator<Item = (&'static str, usize)> {
-        self.0.own.iter().map(|array| (array.field.name, array.field.bytes))
+        self.0.patch.iter().flat_map(|patch| patch.arrays())
     }
 
     /// Memory of the struct and of this model's own arrays \[bytes\].
     ///
     /// Models that differ only in buffer sizes share these arrays.
     pub fn own_bytes(&self) -> usize {
-        let array = |array: &OwnArray| size_of::<OwnArray>() + size_of_val(&*array.memory);
-        size_of::<ShallowModel>() + self.0.own.iter().map(array).sum::<usize>()
+        size_of::<ShallowModel>() + self.0.own.bytes()
     }
 
     /// Memory of all arrays of the compiled model \[bytes\]. All models made from it share these arrays. Arrays that

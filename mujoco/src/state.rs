@@ -381,6 +381,16 @@ impl UserInputs {
         (&self.values, active)
     }
 
+    /// True if these are the inputs that are stored in two parts, bit for bit.
+    pub fn equals_parts(&self, joints: &JointInputs, bodies: &BodyInputs) -> bool {
+        #[cfg(mj4)]
+        if self.active != bodies.active {
+            return false;
+        }
+        let parts = joints.values.iter().chain(&bodies.values).map(|x| x.to_bits());
+        self.values.iter().map(|x| x.to_bits()).eq(parts)
+    }
+
     /// Copies inputs that are stored in two parts.
     pub fn copy_parts(&mut self, joints: &JointInputs, bodies: &BodyInputs) {
         self.values.clear();

@@ -1,14 +1,13 @@
 //! Welds of an environment: the active welds and the relative poses of their bodies.
 //!
 //! The pose of a weld is in the model (`eq_data`). Its active flag is in the model on 2.2.2 and in the data on 4.x. An
-//! environment with welds therefore gets a shallow model with its own copies of these arrays.
+//! environment with welds therefore has them in its [`ModelPatch`].
 
 use super::data::Data;
-use super::editor::set_pointer;
-use super::model::{Model, OwnArray, array_pointer};
+use super::model::Model;
+use super::patch::{ModelPatch, word};
 use mujoco_sys as mj;
-use mujoco_sys::fields::model::{ModelArray, each};
-use std::sync::Arc;
+use std::collections::BTreeMap;
 
 /// Weld equality of a model, and the relative pose of its two bodies with which [`Model::with_welds`] activates it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -37,45 +36,29 @@ impl Model {
     /// One of the equalities is not a weld of this model.
     #[must_use]
     pub fn with_welds(&self, welds: &[Weld]) -> Self {
-        for weld in welds {
-            assert!(self.is_weld(weld.equality), "equality {} is not a weld", weld.equality);
+        match ModelPatch::with_welds(self.patch(), self, welds) {
+            Some(patch) => self.clone().patched(&patch),
+            None => self.without_patch(),
         }
-        let own_of = |field: &ModelArray| matches!(field.name, "eq_data" | "eq_active");
-        let mut own: Vec<OwnArray> =
-            self.own_array_list().iter().filter(|array| !own_of(&array.field)).cloned().collect();
-        let compiled = self.compiled();
-        let mut header = self.copy_header();
-        let mut fields = Vec::new();
-        // SAFETY: the compiled model is alive.
-        unsafe { each(compiled, |field| fields.extend((own_of(&field) && field.bytes > 0).then_some(field))) };
-        for field in fields {
-            set_pointer(&mut header, &field, array_pointer(compiled, &field));
-            if welds.is_empty() {
-                continue;
-            }
-            // SAFETY: the array has this size and lives as long as the compiled model, to which nothing writes.
-            let values = unsafe { std::slice::from_raw_parts(array_pointer(compiled, &field), field.bytes) };
-            let mut values = values.to_vec();
-            for weld in welds {
-                if field.name == "eq_active" {
-                    values[weld.equality] = 1;
-                    continue;
-                }
-                let numbers = weld.pose.iter().flat_map(|number| number.to_ne_bytes());
-                // Anchor in the second body (its origin), then the pose of that body in the first.
-                let row = &mut values[8 * EQ_DATA_WIDTH * weld.equality..8 * EQ_DATA_WIDTH * (weld.equality + 1)];
-                row[..24].fill(0);
-                row[24..80].iter_mut().zip(numbers).for_each(|(to, byte)| *to = byte);
-            }
-            own.push(OwnArray::from_bytes(field, &values));
+    }
+}
+
+impl Weld {
+    /// Puts the words of the array `name` that this weld sets into `words`, by index. `bytes` are those of the compiled
+    /// array.
+    pub(super) fn write(&self, name: &str, bytes: &[u8], words: &mut BTreeMap<u32, u64>) {
+        if name == "eq_active" {
+            let at = self.equality / 8;
+            let word = words.entry(at as u32).or_insert_with(|| word(bytes, at));
+            let mut flags = word.to_ne_bytes();
+            flags[self.equality % 8] = 1;
+            *word = u64::from_ne_bytes(flags);
+            return;
         }
-        for array in &own {
-            set_pointer(&mut header, &array.field, array.memory.as_ptr().cast());
-        }
-        // SAFETY: sizes are those of `self`; pointers lead to the compiled model, which `self` keeps alive, except
-        // those that were just set to `own`, each to memory of the size of its field: moving a box does not move its
-        // content.
-        unsafe { self.with_arrays(header, Arc::from(own)) }
+        // Anchor in the second body (its origin), then the pose of that body in the first.
+        let numbers = [0.0; 3].into_iter().chain(self.pose);
+        let first = EQ_DATA_WIDTH * self.equality;
+        words.extend(numbers.enumerate().map(|(k, number)| ((first + k) as u32, number.to_bits())));
     }
 }
 

@@ -10,6 +10,8 @@
 //! everything that determines a step.
 
 mod bodies;
+#[cfg(test)]
+mod patch_tests;
 mod reads;
 #[cfg(test)]
 mod tests;
@@ -126,6 +128,11 @@ impl Drop for Lease<'_> {
     }
 }
 
+/// Memory of an environment of a batch whose poses are read, without randomized properties \[bytes\].
+fn bytes_per_env(row: &EnvRow, model: &Model) -> usize {
+    size_of::<Box<EnvRow>>() + row.bytes() + BodyCache::bytes_per_env(model)
+}
+
 /// Locks a mutex even if it is poisoned: only a panicking job poisons it, and the pool has already propagated that
 /// panic.
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
@@ -157,7 +164,7 @@ impl Batch {
         let failed = |error| BatchError::Environment { index: 0, error };
         let mut first = SimEnv::with_drives(model, DriveState::new(drives, model)).map_err(failed)?;
         let template = first.saved_row().clone();
-        let bytes = template.bytes().saturating_mul(num_envs);
+        let bytes = bytes_per_env(&template, model).saturating_mul(num_envs);
         // One block of this size meets limits of the process, which Linux otherwise checks row by row.
         let is_limited = Vec::<u8>::new().try_reserve_exact(bytes).is_err();
         if is_limited || available_memory().is_some_and(|available| bytes > available) {

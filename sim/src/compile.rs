@@ -18,6 +18,7 @@ use crate::mjcf::{scene, write};
 use crate::objects::mjcf_part_data::MjcfData;
 use crate::objects::rigid_object_data::RigidObjectData;
 use crate::objects::weld_data::WeldCfg;
+use crate::randomization::StoredOverrides;
 use crate::simulation::{InitialState, Simulation};
 use crate::simulation_cfg::SimulationManagerCfg;
 use crate::snapshot::StateLayout;
@@ -460,7 +461,7 @@ impl CompiledScene {
             layout: Arc::new(StateLayout::of(&self.model, &self.table, cfg.substeps)),
             property_tables: OnceLock::new(),
             model_patcher: Mutex::new(None),
-            property_overrides: vec![None; cfg.num_envs],
+            property_overrides: vec![StoredOverrides::default(); cfg.num_envs],
             env_scenes: Vec::new(),
             visual_proxies: self.proxies,
             overlap_exclusions,

@@ -13,8 +13,8 @@ use crate::row::EnvRow;
 use crate::wrenches::Wrenches;
 use kinetoscope_mujoco as mj;
 use kinetoscope_mujoco::{
-    Buffers, Data, EngineError, IntegrationState, Model, SolvedState, UnnormalizedQuats, UserInputs, Warning,
-    WarningCounts, Weld,
+    Buffers, Data, EngineError, IntegrationState, Model, ModelPatch, SolvedState, UnnormalizedQuats, UserInputs,
+    Warning, WarningCounts, Weld,
 };
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::Arc;
@@ -80,8 +80,10 @@ pub enum Stage {
 #[derive(Debug)]
 pub struct SimEnv {
     data: Data,
-    /// The shared model with the buffer sizes of `data`.
+    /// The compiled model with the buffer sizes of `data`, without a patch.
     base: Model,
+    /// Memory of a model with a patch, while `data` has the shared model.
+    patched: Option<Model>,
     row: Box<EnvRow>,
     stage: Stage,
     /// Quaternions before the last forward pass, above [`Stage::Raw`]; the rest of the state is in `data`.
@@ -122,8 +124,9 @@ impl SimEnv {
     pub(crate) fn with_drives(model: &Model, drives: DriveState) -> Result<Self, EngineError> {
         let mut env = Self {
             data: Data::new(model)?,
-            base: model.clone(),
-            row: Box::new(EnvRow::new(drives)),
+            base: model.without_patch(),
+            patched: None,
+            row: Box::new(EnvRow { patch: model.patch().cloned(), ..EnvRow::new(drives) }),
             stage: Stage::Raw,
             raw_quats: UnnormalizedQuats::new(model),
             buffer_growths: Arc::default(),
@@ -142,6 +145,7 @@ impl SimEnv {
         Ok(Self {
             data: Data::new(&self.base)?,
             base: self.base.clone(),
+            patched: None,
             row: self.row.clone(),
             stage: Stage::Raw,
             raw_quats: self.raw_quats.clone(),
@@ -181,17 +185,8 @@ impl SimEnv {
             }
             return;
         }
-        let model = match &mut row.model {
-            None => &self.base,
-            Some(own) => {
-                // Buffers that grew since the last time need a model with their sizes.
-                *own = own.with_buffers_of(&self.base);
-                &*own
-            }
-        };
-        if !self.data.model().ptr_eq(model) {
-            self.data.set_model(model.clone());
-        }
+        self.apply_patch();
+        let row = &mut *self.row;
         row.restore_inputs(&mut self.data);
         row.motion.restore(&mut self.data);
         if with_results || self.data.model().has_history() {
@@ -319,29 +314,34 @@ impl SimEnv {
         self.held = 0;
     }
 
-    /// Replaces the model by one of the same sizes.
-    pub(crate) fn set_model(&mut self, model: Model) {
+    /// Sets the differences of the environment's model from the compiled one. Welds stay.
+    #[cfg(test)]
+    pub(crate) fn set_patch(&mut self, patch: Option<&Arc<ModelPatch>>) {
         self.make_raw();
-        let welds = &self.row.cold.welds;
-        self.use_model(if welds.is_empty() { model } else { model.with_welds(welds) });
-        self.row.solved_current = true;
-        self.row.is_forward_counted = false;
-        self.row.is_pass_impossible = false;
+        self.row.set_patch(patch, &self.base);
+        self.apply_patch();
         self.row.save_written(&self.data);
     }
 
-    /// Uses a model of this environment alone, or the shared model if the two are equal.
-    fn use_model(&mut self, model: Model) {
-        let has_none = |model: &Model| model.own_arrays().next().is_none();
-        let shared = has_none(&model) && has_none(&self.base) && model.gravity() == self.base.gravity();
-        if shared {
-            self.row.model = None;
-            self.data.set_model(self.base.clone());
-        } else {
-            let model = model.with_buffers_of(&self.base);
-            self.data.set_model(model.clone());
-            self.row.model = Some(model);
+    /// Gives the data the model of the row: the shared one, or one with the patch of the row. The memory of the last
+    /// model with a patch is reused, so only the words that differ are written.
+    fn apply_patch(&mut self) {
+        let current = self.data.model().patch();
+        let Some(patch) = &self.row.patch else {
+            if current.is_some() {
+                self.patched = Some(self.data.replace_model(self.base.clone()));
+            }
+            return;
+        };
+        if current.is_some_and(|current| Arc::ptr_eq(current, patch)) {
+            return;
         }
+        let memory = match self.patched.take() {
+            Some(model) => model,
+            None if current.is_some() => self.data.replace_model(self.base.clone()),
+            None => self.base.clone(),
+        };
+        self.data.set_model(memory.patched(patch));
     }
 
     /// Attaches these welds, and releases all others.
@@ -364,8 +364,8 @@ impl SimEnv {
         for weld in &self.row.cold.welds {
             self.data.set_equality_active(weld.equality, false);
         }
-        let model = self.data.model().with_welds(&welds);
-        self.use_model(model);
+        self.row.patch = ModelPatch::with_welds(self.row.patch.as_ref(), &self.base, &welds);
+        self.apply_patch();
         for weld in &welds {
             self.data.set_equality_active(weld.equality, true);
         }

@@ -10,7 +10,7 @@ use crate::env::{EnvStats, EnvStatus};
 use crate::wrenches::Wrenches;
 use kinetoscope_mujoco as mj;
 use kinetoscope_mujoco::{
-    BodyInputs, Data, IntegrationState, JointInputs, Model, SolvedState, UserInputs, WarningCounts, Weld,
+    BodyInputs, Data, IntegrationState, JointInputs, Model, ModelPatch, SolvedState, UserInputs, WarningCounts, Weld,
 };
 use std::sync::Arc;
 
@@ -29,8 +29,9 @@ pub struct EnvRow {
     pub(crate) body_inputs: Arc<BodyInputs>,
     /// Inputs as of the last write. MuJoCo 2.2.2 clears inputs in its automatic reset after a failed step.
     pub(crate) written: Arc<UserInputs>,
-    /// Model with properties or welds of this environment alone; `None` for the shared model.
-    pub(crate) model: Option<Model>,
+    /// Differences of the environment's model from the compiled one, of its properties and welds; `None` for the shared
+    /// model. After a change, the version must be another one.
+    pub(crate) patch: Option<Arc<ModelPatch>>,
     pub(crate) steps: u64,
     /// Divergence status; `None` while the environment runs.
     pub(crate) diverged: Option<Box<EnvStatus>>,
@@ -73,7 +74,7 @@ impl EnvRow {
             joint_inputs: JointInputs::default(),
             body_inputs: Arc::default(),
             written: Arc::default(),
-            model: None,
+            patch: None,
             steps: 0,
             diverged: None,
             solved_current: true,
@@ -92,6 +93,22 @@ impl EnvRow {
         mj::prefetch(self.solved.values());
         mj::prefetch(self.joint_inputs.values());
         self.drives.prefetch();
+        if let Some(patch) = &self.patch {
+            patch.prefetch();
+        }
+    }
+
+    /// Sets the differences of the environment's model from the compiled one, outside of working memory. Welds stay.
+    pub(crate) fn set_patch(&mut self, patch: Option<&Arc<ModelPatch>>, model: &Model) {
+        self.patch = ModelPatch::with_welds(patch, model, &self.cold.welds);
+        self.solved_current = true;
+        self.is_forward_counted = false;
+        self.is_pass_impossible = false;
+        if !self.written.equals_parts(&self.joint_inputs, &self.body_inputs) {
+            own(&mut self.written).copy_parts(&self.joint_inputs, &self.body_inputs);
+        }
+        // No `mjData` holds this row any longer.
+        self.version = 0;
     }
 
     /// Memory that this row takes in a running batch without randomized properties \[bytes\]: with inputs of its own,
@@ -233,9 +250,17 @@ impl StoredRow<'_> {
         self.row.joint_inputs.ctrl(self.model)
     }
 
-    /// Properties of the environment: its own model, or the shared one.
-    pub(crate) fn own_model(&self) -> &Model {
-        self.row.model.as_ref().unwrap_or(self.model)
+    /// Model of the environment, with its properties: a new one unless they are nominal.
+    pub(crate) fn own_model(&self) -> Model {
+        match &self.row.patch {
+            None => self.model.without_patch(),
+            Some(patch) => self.model.clone().patched(patch),
+        }
+    }
+
+    /// Gravity of the environment in world axes \[m/s²\].
+    pub(crate) fn gravity(&self) -> [f64; 3] {
+        self.row.patch.as_ref().map_or_else(|| self.model.gravity(), |patch| patch.gravity())
     }
 }
 

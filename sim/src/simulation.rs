@@ -5,7 +5,7 @@ use crate::capture::BodyAxis;
 use crate::entity_set::EntitySet;
 use crate::env::Stage;
 use crate::indexing::{BodyIndexing, MjcfIndexing, RobotIndexing, WeldIndexing, joint_widths};
-use crate::randomization::{ModelPatcher, PropertyOverrides, PropertyTables};
+use crate::randomization::{ModelPatcher, PropertyTables, StoredOverrides};
 use crate::simulation_cfg::SimulationManagerCfg;
 use crate::snapshot::StateLayout;
 use crate::visible::{self, Lighting, MaskId, MaskIdMap, Replacements, VisualCache, VisualScene};
@@ -39,8 +39,8 @@ pub(crate) struct Simulation {
     /// Builds models with per-environment properties; `None` before the first randomization. The lock only lets threads
     /// share the other fields.
     pub(crate) model_patcher: Mutex<Option<ModelPatcher>>,
-    /// Property overrides of each environment; `None` for an environment with the nominal model.
-    pub(crate) property_overrides: Vec<Option<Box<PropertyOverrides>>>,
+    /// Own property values of each environment.
+    pub(crate) property_overrides: Vec<StoredOverrides>,
     /// Render scenes of environments with their own sizes or colors; empty without such environments, or before the
     /// visual scene exists.
     pub(crate) env_scenes: Vec<EnvScene>,

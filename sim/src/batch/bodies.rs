@@ -28,6 +28,11 @@ impl BodyCache {
         self.is_current
     }
 
+    /// Memory of the motion of one environment, once it is read \[bytes\].
+    pub(super) fn bytes_per_env(model: &Model) -> usize {
+        BODY_NUMBERS * model.nbody() * size_of::<f64>() + size_of::<u64>()
+    }
+
     /// Compares the versions again in the next [`update`](Self::update), because a row may change.
     pub(super) fn expect_changes(&mut self) {
         self.is_current = false;
@@ -122,5 +127,32 @@ impl BodyArrays for StoredBodies<'_> {
 
     fn body_rootid(&self) -> &[i32] {
         self.row.model.body_rootid()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::batch::Batch;
+    use kinetoscope_exec::ThreadPool;
+    use std::sync::Arc;
+
+    /// The memory that a batch asks for has that of the motion of all environments.
+    #[test]
+    fn memory_of_motion() {
+        let text = r#"<mujoco><worldbody><body><freejoint/><geom size="0.1"/>
+            <body pos="0 0 1"><joint/><geom size="0.1"/></body></body></worldbody></mujoco>"#;
+        let model = kinetoscope_mujoco::compile(text, &[]).expect("compiles").into_model();
+        let batch = Batch::new(&model, &Arc::default(), 70, 2, ThreadPool::new()).expect("small");
+        let bytes = || -> usize {
+            let of = |cache: &BodyCache| size_of_val(&*cache.values) + size_of_val(&*cache.versions);
+            batch.chunks.chunks.iter().map(|chunk| of(&crate::batch::lock(chunk).bodies)).sum()
+        };
+        assert_eq!(bytes(), 0);
+        batch.body_rows(|bodies| [bodies.xpos()[3]]);
+        assert_eq!(bytes(), 70 * BodyCache::bytes_per_env(&model));
+        let row = batch.read_row(0, |row| row.bytes());
+        let asked = batch.read_row(0, |stored| crate::batch::bytes_per_env(stored.row, &model));
+        assert_eq!(asked, row + BodyCache::bytes_per_env(&model) + size_of::<usize>());
     }
 }

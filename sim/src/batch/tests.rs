@@ -220,7 +220,7 @@ fn rows_and_plain_mujoco() {
         for i in 0..ENVS {
             batch.write_at(i, Stage::Raw, |env| {
                 if i % 3 == 1 {
-                    env.set_model(own_model(i).with_buffers_of(env.data().model()));
+                    env.set_patch(own_model(i).patch());
                 }
                 if i % 2 == 0 {
                     env.set_welds(vec![weld(i)]);

@@ -77,10 +77,10 @@ impl DriveTable {
         self.models.push(ExplicitDrive { drive, model, memory });
     }
 
-    /// Friction row of each drive in environments of `model`, counted among the friction rows of degrees of freedom; 0
-    /// for drives without a row. MuJoCo creates a row for each degree of freedom with friction, in their order.
-    pub fn rows(&self, model: &mj::Model) -> Vec<usize> {
-        let before = |dof: usize| model.dof_frictionloss()[..dof].iter().filter(|friction| **friction > 0.0).count();
+    /// Friction row of each drive in environments with this `dof_frictionloss`, counted among the friction rows of degrees
+    /// of freedom; 0 for drives without a row. MuJoCo creates a row for each degree of freedom with friction, in their order.
+    pub fn rows(&self, frictionloss: &[f64]) -> Vec<usize> {
+        let before = |dof: usize| frictionloss[..dof].iter().filter(|friction| **friction > 0.0).count();
         let row = |drive: &Drive| if drive.realization == Realization::ConstraintRow { before(drive.dof) } else { 0 };
         self.drives.iter().map(row).collect()
     }
@@ -197,7 +197,7 @@ impl DriveState {
             effort: vec![0.0; n].into(),
             applied: zero_forces.clone(),
             memory: table.models.iter().flat_map(|drive| drive.model.law().initial_memory()).collect(),
-            rows: CowArray(table.rows(model).into()),
+            rows: CowArray(table.rows(model.dof_frictionloss()).into()),
             damping: CowArray(table.damped.iter().map(|(_, damping)| *damping).collect()),
             initial: Arc::new(InitialDrives { table: Arc::clone(table), position, zero_targets, zero_forces }),
         };
@@ -303,6 +303,16 @@ impl DriveState {
     /// Sets the coefficients of the damping inside the drive solve.
     pub(crate) fn set_damping(&mut self, damping: &[f64]) {
         damping.iter().enumerate().for_each(|(index, value)| self.damping.set_if_changed(index, *value));
+    }
+
+    /// True if these are the coefficients of the damping inside the drive solve, bit for bit.
+    pub(crate) fn has_damping(&self, damping: &[f64]) -> bool {
+        self.damping.iter().map(|x| x.to_bits()).eq(damping.iter().map(|x| x.to_bits()))
+    }
+
+    /// True if these are the friction rows.
+    pub(crate) fn has_rows(&self, rows: &[usize]) -> bool {
+        *self.rows == *rows
     }
 
     /// Sets the friction rows, as [`DriveTable::rows`] returns them.

@@ -334,7 +334,8 @@ impl SimEnv {
         if self.data.bytes() > MAX_ENV_BYTES {
             return Err(Divergence::BuffersExhausted(buffers));
         }
-        let model = self.data.model().with_buffers(buffers);
+        let base = self.base.with_buffers(buffers);
+        let model = self.row.patch.as_ref().map_or_else(|| base.clone(), |patch| base.clone().patched(patch));
         let mut data = Data::new(&model).map_err(Divergence::Engine)?;
         let mut solved = SolvedState::default();
         solved.save(&self.data);
@@ -348,13 +349,7 @@ impl SimEnv {
             }
         }
         self.row.motion.restore(&mut data);
-        self.data = data;
-        self.base = self.base.with_buffers_of(&model);
-        if self.row.model.is_some() {
-            self.row.model = Some(model);
-        } else {
-            self.data.set_model(self.base.clone());
-        }
+        (self.data, self.base, self.patched) = (data, base, None);
         self.stage = Stage::Raw;
         self.held = 0;
         self.buffer_growths.fetch_add(1, Ordering::Relaxed);

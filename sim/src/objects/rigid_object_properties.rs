@@ -67,7 +67,8 @@ impl RigidObject<'_> {
         let mut values = Array2::zeros((self.simulation.batch.num_envs(), 2));
         if let Some((_, dof)) = self.simulation.objects[self.index].free_joint {
             self.simulation.batch.for_each_row(|i, row| {
-                let damping = row.own_model().dof_damping();
+                let model = row.own_model();
+                let damping = model.dof_damping();
                 [damping[dof], damping[dof + 3]].into_iter().enumerate().for_each(|(k, value)| values[(i, k)] = value);
             });
         }
@@ -98,7 +99,7 @@ impl RigidObject<'_> {
         let moves = self.cfg().body_type == BodyType::Dynamic;
         let mut values = Array2::zeros((self.simulation.batch.num_envs(), width));
         self.simulation.batch.for_each_row(|i, row| {
-            let numbers = if moves { read(row.own_model(), body) } else { nominal.clone() };
+            let numbers = if moves { read(&row.own_model(), body) } else { nominal.clone() };
             numbers.into_iter().enumerate().for_each(|(k, value)| values[(i, k)] = value);
         });
         values

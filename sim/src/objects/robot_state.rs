@@ -178,7 +178,7 @@ impl Robot<'_> {
     #[doc(alias = "get_projected_gravity_b")]
     pub fn projected_gravity_b(&self) -> Array2<f64> {
         self.in_root_axes(|bodies, _, _| {
-            let gravity = Vector3::from(bodies.own_model().gravity());
+            let gravity = Vector3::from(bodies.gravity());
             gravity.try_normalize(0.0).unwrap_or_else(Vector3::zeros)
         })
     }

@@ -6,9 +6,10 @@ use super::properties::{Properties, PropertyOverrides};
 use super::tables::{FrictionLocation, dofs_of, friction_location};
 use crate::drive::gains::Gains;
 use crate::drive::table::{DriveState, DriveTable};
-use crate::env::SimEnv;
 use crate::error::Result;
-use kinetoscope_mujoco::{DiagonalInertia, Model, ModelEditor};
+use crate::row::EnvRow;
+use kinetoscope_mujoco::{DiagonalInertia, Model, ModelEditor, ModelPatch};
+use std::sync::Arc;
 
 /// Creator of environment models for one compiled scene.
 #[derive(Debug)]
@@ -19,16 +20,17 @@ pub(crate) struct ModelPatcher {
 
 /// Model and drive settings that are prepared for an environment.
 pub(crate) struct EnvPatch {
-    /// New model; `None` if the environment keeps its model.
-    model: Option<Model>,
-    /// Proportional gain, derivative gain and effort limit of each drive; `None` for values that stay.
+    /// New differences from the compiled model; `None` if the environment keeps those that it has.
+    model: Option<Option<Arc<ModelPatch>>>,
+    /// Proportional gain, derivative gain and effort limit of drives; `None` for values that stay.
     gains: Vec<(usize, [Option<f64>; 3])>,
     /// True if all drives first return to their nominal gains, which are not randomized.
     nominal_gains: bool,
-    /// Damping of joints, in the layout of [`DriveState::set_damping`](crate::drive::table::DriveState::set_damping).
+    /// Damping of joints, in the layout of [`DriveState::set_damping`](crate::drive::table::DriveState::set_damping);
+    /// empty if it stays.
     damping: Vec<f64>,
     /// Friction rows of the model, in the layout of
-    /// [`DriveState::set_rows`](crate::drive::table::DriveState::set_rows).
+    /// [`DriveState::set_rows`](crate::drive::table::DriveState::set_rows); empty if they stay.
     rows: Vec<usize>,
 }
 
@@ -38,36 +40,42 @@ impl ModelPatcher {
         Ok(Self { editor: ModelEditor::new(base)?, base: base.clone() })
     }
 
-    /// Prepares environment `index`, which is `env`, for these properties. `own` are its own values, from
+    /// Prepares environment `index`, whose row is `row`, for these properties. `own` are its own values, from
     /// [`Properties::overrides`].
     pub(crate) fn prepare(
         &mut self,
         properties: &Properties,
         own: &PropertyOverrides,
         index: usize,
-        env: &SimEnv,
+        row: &EnvRow,
     ) -> Result<EnvPatch> {
-        let drives = env.drives.table();
+        let drives = row.drives.table();
         properties.check(index)?;
-        check_models(properties, &env.drives, index)?;
+        check_models(properties, &row.drives, index)?;
         let mut damping: Vec<f64> = drives.damped.iter().map(|(_, damping)| *damping).collect();
         let is_nominal = own.iter().all(Option::is_none);
         self.editor.load(&self.base);
         if !is_nominal && self.edit(properties, drives, &mut damping, index)? {
             self.editor.set_constants()?;
         }
-        let had_none =
-            env.data().model().own_arrays().next().is_none() && env.data().model().gravity() == self.base.gravity();
-        let model = (!(is_nominal && had_none)).then(|| self.editor.model(env.data().model()));
+        let model = (!is_nominal || row.patch.is_some()).then(|| self.editor.patch());
         let values = |property: Property| &properties.values[property as usize];
         let places = &properties.tables.get(Property::Stiffness).indices;
-        let gains = places.iter().enumerate().map(|(element, &drive)| {
+        let nominal_gains = properties.nominal_gains;
+        let gains = places.iter().enumerate().filter_map(|(element, &drive)| {
             let gains = [Property::Stiffness, Property::DriveDamping, Property::MaxEffort];
             let drawn = |of: Property| properties.is_changed(of, element).then(|| values(of)[element]);
-            (drive, gains.map(drawn))
+            let gains = gains.map(drawn);
+            (nominal_gains || gains != [None; 3]).then_some((drive, gains))
         });
-        let rows = drives.rows(model.as_ref().unwrap_or(env.data().model()));
-        Ok(EnvPatch { model, gains: gains.collect(), nominal_gains: properties.nominal_gains, damping, rows })
+        let mut rows = drives.rows(self.editor.dof_frictionloss());
+        if row.drives.has_rows(&rows) {
+            rows = Vec::new();
+        }
+        if row.drives.has_damping(&damping) {
+            damping = Vec::new();
+        }
+        Ok(EnvPatch { model, gains: gains.collect(), nominal_gains, damping, rows })
     }
 
     /// Writes the values that differ from the nominal ones. Returns true if MuJoCo's derived constants must be
@@ -185,18 +193,29 @@ fn check_models(properties: &Properties, drives: &DriveState, env: usize) -> Res
 }
 
 impl EnvPatch {
-    /// Applies the model and the drive settings to the environment.
-    pub(crate) fn apply(self, env: &mut SimEnv) {
+    /// Differences of the environment's model from the compiled one.
+    pub(super) fn model_patch(&self) -> Option<&ModelPatch> {
+        self.model.as_ref()?.as_deref()
+    }
+
+    /// Memory besides the struct \[bytes\].
+    pub(super) fn bytes(&self) -> usize {
+        let lists = size_of_val(&*self.gains) + size_of_val(&*self.damping) + size_of_val(&*self.rows);
+        self.model_patch().map_or(0, ModelPatch::bytes) + lists
+    }
+
+    /// Applies the model and the drive settings to the row of the environment. `model` is the compiled model.
+    pub(crate) fn apply(self, row: &mut EnvRow, model: &Model) {
         for (drive, gains) in self.gains {
             if self.nominal_gains {
-                env.drives.reset_to_nominal(drive);
+                row.drives.reset_to_nominal(drive);
             }
-            env.drives.override_gains(drive, gains);
+            row.drives.override_gains(drive, gains);
         }
-        env.drives.set_damping(&self.damping);
-        env.drives.set_rows(&self.rows);
-        if let Some(model) = self.model {
-            env.set_model(model);
+        row.drives.set_damping(&self.damping);
+        row.drives.set_rows(&self.rows);
+        if let Some(patch) = self.model {
+            row.set_patch(patch.as_ref(), model);
         }
     }
 }

@@ -1,11 +1,11 @@
 //! Access to properties of environments through the manager.
 
-use super::{Properties, Property, PropertyOverrides, Randomization};
-use crate::env::Stage;
+use super::{Properties, Property, Randomization};
 use crate::error::{Error, Result};
 use crate::ids::{EnvId, env_mask};
 use crate::manager::SimulationManager;
 use crate::objects::unique_envs;
+use crate::row::StoredRow;
 use crate::snapshot::Snapshot;
 use kinetoscope_scene::KeyedRng;
 use ndarray::Array2;
@@ -24,9 +24,9 @@ impl SimulationManager {
 
 /// Read access to properties of environments: masses, frictions, sizes, gains; see [`SimulationManager::properties`].
 ///
-/// The environments of a simulation share one compiled model. An environment with properties of its own gets a shallow
-/// copy of the model's struct, which owns only the arrays that differ. Constants that follow from masses (MuJoCo's
-/// `mj_setConst`) are computed for it. All other environments share everything.
+/// The environments of a simulation share one compiled model. An environment with properties of its own keeps the numbers
+/// in which its model differs, the constants that follow from masses included (MuJoCo's `mj_setConst`). A thread writes
+/// them to arrays of its own while it works on the environment.
 ///
 /// Random numbers are keyed by the seed of the simulation, the global index of the environment, the number of its
 /// previous randomizations (calls that selected it), and the property and name. So they depend neither on the number of
@@ -58,25 +58,26 @@ impl<'a> EnvProperties<'a> {
     pub fn of(&self, env: EnvId) -> Result<Properties> {
         env_mask(Some(&[env]), self.sim.num_envs())?;
         let tables = self.sim.simulation.tables();
-        Ok(self
-            .sim
-            .simulation
-            .batch
-            .read_at(env.0, Stage::Raw, |here| self.sim.simulation.properties_of(tables, env.0, here)))
+        let simulation = &self.sim.simulation;
+        Ok(simulation.batch.read_row(env.0, |row| simulation.properties_of(tables, env.0, &row)))
     }
 
-    /// Memory of an environment's own properties \[bytes\]: the struct and the arrays of the model that it does not
-    /// share (with those of the welds that hold), and the values. 0 if all properties are nominal, whatever welds hold.
-    /// Gains and limits of drives do not count. One whole copy of the model is kept in addition, for all environments.
+    /// Memory of an environment's own properties \[bytes\]: the numbers in which its model differs from the shared one
+    /// (with those of the welds that hold), and values that its model does not have, such as joint damping that its
+    /// drives apply. The list of places of these numbers, which environments share, counts in equal parts. 0 if all
+    /// properties are nominal, whatever welds hold. Gains and limits of drives do not count. In addition, one whole copy
+    /// of the model is kept for all environments, and one of the arrays that differ for each thread.
     ///
     /// # Errors
     /// The environment does not exist.
     pub fn bytes(&self, env: EnvId) -> Result<usize> {
         env_mask(Some(&[env]), self.sim.num_envs())?;
-        let Some(own) = &self.sim.simulation.property_overrides[env.0] else { return Ok(0) };
-        let values: usize = own.iter().flatten().map(|values| size_of_val(&**values)).sum();
-        let model = self.sim.simulation.batch.read_row(env.0, |row| row.own_model().own_bytes());
-        Ok(model + size_of::<PropertyOverrides>() + values)
+        let own = &self.sim.simulation.property_overrides[env.0];
+        if own.is_nominal() {
+            return Ok(0);
+        }
+        let patch = |row: StoredRow<'_>| row.patch.as_ref().map_or(0, |patch| patch.bytes());
+        Ok(self.sim.simulation.batch.read_row(env.0, patch) + own.bytes())
     }
 }
 

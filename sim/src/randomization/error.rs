@@ -72,6 +72,14 @@ pub enum RandomizationError {
         /// Number of values of the property.
         expected: usize,
     },
+    /// The memory for the own values and models of all environments is not available.
+    #[error("properties of {envs} environments need {} MiB of memory, which is not available; choose fewer", bytes >> 20)]
+    OutOfMemory {
+        /// Number of environments to change.
+        envs: usize,
+        /// Needed memory \[bytes\].
+        bytes: usize,
+    },
     /// The scene of an environment cannot be rendered.
     #[error("environment {env}: its scene cannot be rendered: {error}")]
     EnvScene {

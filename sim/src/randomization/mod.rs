@@ -4,6 +4,7 @@ mod apply;
 mod env_properties;
 mod error;
 mod named;
+mod overrides;
 mod properties;
 mod property;
 mod tables;
@@ -14,6 +15,7 @@ pub(crate) use apply::ModelPatcher;
 pub use env_properties::{EnvProperties, EnvPropertiesMut};
 pub use error::RandomizationError;
 pub(crate) use named::NamedValue;
+pub(crate) use overrides::StoredOverrides;
 pub use properties::Properties;
 pub(crate) use properties::PropertyOverrides;
 pub use property::Property;
@@ -21,9 +23,12 @@ pub(crate) use tables::PropertyTables;
 use tables::SceneContext;
 pub use terms::{Randomization, RandomizationOp, RandomizationTerm};
 
-use crate::env::{SimEnv, Stage};
+use crate::available_memory::available_memory;
+use crate::env::SimEnv;
 use crate::error::Result;
+use crate::row::EnvRow;
 use crate::simulation::Simulation;
+use kinetoscope_mujoco::ModelPatch;
 use kinetoscope_scene::{EnvScene, RenderSceneError};
 use std::sync::{Arc, PoisonError};
 
@@ -39,25 +44,42 @@ impl Simulation {
         })
     }
 
-    fn properties_of(&self, tables: &Arc<PropertyTables>, index: usize, env: &SimEnv) -> Properties {
-        let own = self.property_overrides[index].as_deref().unwrap_or(&NO_OVERRIDES);
-        Properties::new(tables, own, &env.drives)
+    /// Own property values of an environment with this patch.
+    fn overrides_in(&self, env: usize, patch: Option<&Arc<ModelPatch>>) -> PropertyOverrides {
+        let stored = &self.property_overrides[env];
+        if stored.is_nominal() {
+            return NO_OVERRIDES;
+        }
+        stored.all(self.tables(), self.batch.model(), patch.map(|patch| &**patch))
+    }
+
+    /// Own property values of an environment.
+    fn overrides_of(&self, env: usize) -> PropertyOverrides {
+        // Created before an environment is locked: the creation reads an environment.
+        self.tables();
+        self.batch.read_row(env, |row| self.overrides_in(env, row.patch.as_ref()))
+    }
+
+    /// Properties of the environment `env`, whose row is `row`.
+    fn properties_of(&self, tables: &Arc<PropertyTables>, env: usize, row: &EnvRow) -> Properties {
+        Properties::new(tables, &self.overrides_in(env, row.patch.as_ref()), &row.drives)
     }
 
     /// Own property values of an environment, `here`, by name.
     pub(crate) fn named_properties(&self, env: usize, here: &SimEnv) -> Vec<NamedValue> {
-        self.tables().named_overrides(self.property_overrides[env].as_deref().unwrap_or(&NO_OVERRIDES), &here.drives)
+        self.tables().named_overrides(&self.overrides_in(env, here.patch.as_ref()), &here.drives)
     }
 
     /// Reads a scalar property (not a gain) of the element `name` in every environment. Does nothing if no such element
     /// has it.
     pub(crate) fn read_property(&self, property: Property, name: &str, mut read: impl FnMut(usize, f64)) {
-        let table = self.tables().get(property);
+        let tables = self.tables();
+        let table = tables.get(property);
         let Some(element) = table.names.iter().position(|of| of == name) else { return };
-        for (env, own) in self.property_overrides.iter().enumerate() {
-            let own = own.as_ref().and_then(|own| own[property as usize].as_ref());
+        self.batch.for_each_row(|env, row| {
+            let own = self.property_overrides[env].get(property, tables, row.model, row.patch.as_deref());
             read(env, own.map_or(table.nominal[element], |values| values[element]));
-        }
+        });
     }
 
     /// True for each name of an element that has the property.
@@ -78,35 +100,58 @@ impl Simulation {
         };
         // Created before an environment is locked: the creation reads an environment.
         let tables = Arc::clone(self.tables());
-        let made: Result<Vec<_>> = envs
-            .iter()
-            .map(|&index| {
-                self.batch.read_at(index, Stage::Raw, |env| {
-                    let mut properties = self.properties_of(&tables, index, env);
-                    change(index, &mut properties)?;
-                    let own = properties.overrides();
-                    let made = maker.prepare(&properties, &own, index, env)?;
-                    Ok((index, own, made))
-                })
-            })
-            .collect();
+        let made = self.prepare_changes(&mut maker, &tables, envs, &mut change);
         *self.model_patcher.get_mut().unwrap_or_else(PoisonError::into_inner) = Some(maker);
-        let made = made?;
-        let looks_other = |(index, own, _): &&(usize, PropertyOverrides, EnvPatch)| {
-            let before = self.property_overrides[*index].as_deref().unwrap_or(&NO_OVERRIDES);
-            [Property::Size, Property::Color].iter().any(|p| before[*p as usize] != own[*p as usize])
-        };
-        let others: Vec<_> = made.iter().filter(looks_other).map(|(index, own, _)| (*index, own)).collect();
+        let (made, others) = made?;
+        let others: Vec<_> = others.iter().map(|(env, own)| (*env, own)).collect();
         let mut looks = Vec::with_capacity(others.len());
         for (env, look) in self.env_scenes(&others) {
             looks.push((env, look.map_err(|error| RandomizationError::EnvScene { env, error })?));
         }
         for (index, own, made) in made {
-            self.property_overrides[index] = own.iter().any(Option::is_some).then(|| own.into());
-            self.batch.write_at(index, Stage::Raw, |env| made.apply(env));
+            self.property_overrides[index] = own;
+            self.batch.edit_row(index, |row, model| made.apply(row, model));
         }
         self.set_env_scenes(looks);
         Ok(())
+    }
+
+    /// Prepares a change of the properties of environments. Returns what to store and to apply, and the own values of
+    /// environments whose sizes or colors change.
+    fn prepare_changes(
+        &self,
+        maker: &mut ModelPatcher,
+        tables: &Arc<PropertyTables>,
+        envs: &[usize],
+        mut change: impl FnMut(usize, &mut Properties) -> Result<()>,
+    ) -> Result<PreparedChanges> {
+        let mut properties = self.batch.read_row(0, |row| Properties::new(tables, &NO_OVERRIDES, &row.drives));
+        let (mut made, mut others) = (Vec::with_capacity(envs.len()), Vec::new());
+        for &index in envs {
+            self.batch.read_row(index, |row| -> Result<()> {
+                let before = &self.property_overrides[index];
+                properties.load(&self.overrides_in(index, row.patch.as_ref()), &row.drives);
+                change(index, &mut properties)?;
+                let own = properties.overrides();
+                let patch = maker.prepare(&properties, &own, index, row.row)?;
+                let stored = StoredOverrides::new(&own, tables, row.model, patch.model_patch());
+                let looks_other = [Property::Size, Property::Color].into_iter().any(|property| {
+                    let mine = &own[property as usize];
+                    (before.has(property) || mine.is_some())
+                        && before.get(property, tables, row.model, row.patch.as_deref()) != *mine
+                });
+                if looks_other {
+                    others.push((index, own));
+                }
+                if made.is_empty() {
+                    let bytes = size_of::<PreparedChange>() + stored.bytes() + patch.bytes();
+                    check_memory(envs.len(), bytes, available_memory())?;
+                }
+                made.push((index, stored, patch));
+                Ok(())
+            })?;
+        }
+        Ok((made, others))
     }
 
     /// Render scenes of environments with these own values; empty while the scene is not rendered.
@@ -142,9 +187,9 @@ impl Simulation {
     /// Builds the render scenes of all environments when rendering starts. An environment whose scene is invalid is
     /// rendered with the nominal scene; its error is returned.
     pub(crate) fn rebuild_env_scenes(&mut self) -> Vec<(usize, RenderSceneError)> {
-        let own = self.property_overrides.iter().map(|own| own.as_deref().unwrap_or(&NO_OVERRIDES));
+        let own: Vec<_> = (0..self.property_overrides.len()).map(|env| self.overrides_of(env)).collect();
         let (mut looks, mut faults) = (Vec::new(), Vec::new());
-        for (env, look) in self.env_scenes(&own.enumerate().collect::<Vec<_>>()) {
+        for (env, look) in self.env_scenes(&own.iter().enumerate().collect::<Vec<_>>()) {
             match look {
                 Ok(look) => looks.push((env, look)),
                 Err(error) => faults.push((env, error)),
@@ -157,18 +202,16 @@ impl Simulation {
     /// Carries over the own property values of the environments of `old`, by name.
     pub(crate) fn carry_properties(&mut self, old: &Self) -> Result<()> {
         let envs: Vec<usize> =
-            (0..old.property_overrides.len()).filter(|&env| old.property_overrides[env].is_some()).collect();
+            (0..old.property_overrides.len()).filter(|&env| !old.property_overrides[env].is_nominal()).collect();
         if envs.is_empty() {
             return Ok(());
         }
         let tables = Arc::clone(self.tables());
         self.change_properties(&envs, |env, properties| {
-            if let Some(own) = &old.property_overrides[env] {
-                let own = Properties::transferred(own, old.tables(), &tables);
-                for (values, own) in properties.values.iter_mut().zip(own) {
-                    if let Some(own) = own {
-                        *values = own.into();
-                    }
+            let own = Properties::transferred(&old.overrides_of(env), old.tables(), &tables);
+            for (values, own) in properties.values.iter_mut().zip(own) {
+                if let Some(own) = own {
+                    *values = own.into();
                 }
             }
             Ok(())
@@ -176,5 +219,35 @@ impl Simulation {
     }
 }
 
+/// Environment, and its own values and model, which are prepared.
+type PreparedChange = (usize, StoredOverrides, EnvPatch);
+
+/// All prepared environments, and the own values of those whose sizes or colors change.
+type PreparedChanges = (Vec<PreparedChange>, Vec<(usize, PropertyOverrides)>);
+
+/// Checks that own values and models of `envs` environments fit in the available memory, if each of them takes `bytes`.
+fn check_memory(envs: usize, bytes: usize, available: Option<usize>) -> Result<(), RandomizationError> {
+    let bytes = bytes.saturating_mul(envs);
+    match available {
+        Some(available) if bytes > available => Err(RandomizationError::OutOfMemory { envs, bytes }),
+        _ => Ok(()),
+    }
+}
+
 /// Own values of an environment without any.
 const NO_OVERRIDES: PropertyOverrides = [const { None }; Property::ALL.len()];
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn memory() {
+        assert!(check_memory(1000, 2000, Some(2_000_000)).is_ok());
+        assert!(check_memory(1 << 20, usize::MAX / 2, None).is_ok());
+        let refused = check_memory(10_000_000, 2048, Some(16 << 30)).expect_err("19 GiB do not fit");
+        assert!(refused.to_string().contains("19531 MiB"), "{refused}");
+        assert!(check_memory(1000, 2001, Some(2_000_000)).is_err());
+        assert!(check_memory(usize::MAX, 2, Some(16 << 30)).is_err());
+    }
+}

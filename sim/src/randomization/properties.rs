@@ -34,8 +34,20 @@ pub struct Properties {
 impl Properties {
     /// Properties of an environment with these own values and drives.
     pub(super) fn new(tables: &Arc<PropertyTables>, own: &PropertyOverrides, drives: &DriveState) -> Self {
-        let values = Property::ALL.map(|property| {
-            let table = tables.get(property);
+        let mut properties = Self {
+            tables: Arc::clone(tables),
+            values: [const { Vec::new() }; Property::ALL.len()],
+            changed_gains: BTreeSet::new(),
+            nominal_gains: false,
+        };
+        properties.load(own, drives);
+        properties
+    }
+
+    /// Replaces everything by the properties of an environment with these own values and drives, reusing memory.
+    pub(super) fn load(&mut self, own: &PropertyOverrides, drives: &DriveState) {
+        for (property, values) in Property::ALL.into_iter().zip(&mut self.values) {
+            let table = self.tables.get(property);
             let gain = |place: &usize| {
                 let gains = drives.gains[*place];
                 match property {
@@ -44,13 +56,15 @@ impl Properties {
                     _ => gains.max_effort,
                 }
             };
+            values.clear();
             match &own[property as usize] {
-                _ if property.is_gain() => table.indices.iter().map(gain).collect(),
-                Some(values) => values.to_vec(),
-                None => table.nominal.clone(),
+                _ if property.is_gain() => values.extend(table.indices.iter().map(gain)),
+                Some(own) => values.extend_from_slice(own),
+                None => values.extend_from_slice(&table.nominal),
             }
-        });
-        Self { tables: Arc::clone(tables), values, changed_gains: BTreeSet::new(), nominal_gains: false }
+        }
+        self.changed_gains.clear();
+        self.nominal_gains = false;
     }
 
     /// True if this copy has randomized or set the gain of an element; earlier randomizations do not count.

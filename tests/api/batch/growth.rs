@@ -58,7 +58,7 @@ fn pile_of_robots() {
     }
     compare_with_huge_buffers(&mut sim, 60, 24);
     // On 4.x the arena of a scene of 24 robots has room for the pile.
-    assert!(sim.warnings().buffer_growths() > 0 || BUILD_VERSION != SupportedVersion::V2);
+    assert_eq!(sim.warnings().buffer_growths() > 0, BUILD_VERSION == SupportedVersion::V2);
 }
 
 /// The model, and an environment with many contacts.
@@ -131,12 +131,13 @@ fn every_failing_allocation() {
 #[test]
 fn all_environments() {
     let mut sim = sim(cfg(9, 3));
-    add_plate(&mut sim, [10, 2], [1.0, 1.0, 0.4], [0.3, 0.2, 0.1]);
-    sim.update(120);
+    add_plate(&mut sim, [14, 0], [1.0, 1.0, 0.1], [0.0; 3]);
+    sim.update(60);
     let bits = all_bits(&sim);
     assert!(bits.iter().all(|env| *env == bits[0]));
-    // Each of three threads grows its own buffers.
+    // Each of three threads that takes an environment grows its own buffers, from 16 contacts to the 196 of the plate at
+    // most: four times on 2.2.2, and as often for the rows. On 4.x one arena has both.
     let growths = sim.warnings().buffer_growths();
-    assert!((1..=30).contains(&growths) || BUILD_VERSION != SupportedVersion::V2, "{growths}");
+    assert!((1..=3 * 8).contains(&growths), "{growths}");
     assert_quiet(&sim);
 }

@@ -9,4 +9,5 @@ mod sizes;
 mod sizes_and_colors;
 mod snapshot;
 mod viewer_queries;
+mod whole_models;
 mod worlds;
