@@ -313,7 +313,7 @@ impl Context {
                     .iter()
                     .map(|item| element.map_or_else(|| literal(item), |class| self.instance(class, item)))
                     .collect();
-                if items.iter().map(String::len).sum::<usize>() < WIDTH {
+                if element.is_none() || items.iter().map(String::len).sum::<usize>() < WIDTH {
                     return format!("field(default_factory=lambda: [{}])", items.join(", "));
                 }
                 let items: String = items.iter().map(|item| format!("            {item},\n")).collect();
@@ -339,7 +339,10 @@ impl Context {
     }
 
     fn class_of(&self, ty: &Type) -> Option<&'static str> {
-        self.classes.get(ident(ty).as_str()).copied()
+        let name = ident(ty);
+        let of_rust = self.classes.get(name.as_str()).copied();
+        // Enumerations that macros declare name the classes of Python.
+        of_rust.or_else(|| self.classes.values().copied().find(|class| *class == name))
     }
 
     /// Type annotation of a field.
