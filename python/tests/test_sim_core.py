@@ -229,8 +229,8 @@ def test_names_and_collections(arm_sim):
     assert sorted(names) == sorted(arm.link_names)
     depths = [len(line) - len(line.lstrip()) for line in tree]
     assert depths[0] == 0 and "(" not in tree[0] and all(after <= before + 2 for before, after in zip(depths, depths[1:], strict=False))
-    at = names.index("LINK3")
-    assert tree[at].endswith("LINK3 (JOINT3)") and names[at - 1] == "LINK2" and depths[at] == depths[at - 1] + 2
+    at = names.index("link3")
+    assert tree[at].endswith("link3 (JOINT3)") and names[at - 1] == "link2" and depths[at] == depths[at - 1] + 2
 
 
 def test_pickles(arm_sim):

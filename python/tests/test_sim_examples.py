@@ -49,7 +49,7 @@ def test_tasks_of_the_page():
     first, second = (code for code in re.findall(r"```python\n(.*?)```", page, re.DOTALL) if "ks.Task(" in code)
     sim = ks.SimulationManager(ks.SimulationManagerCfg.legged(num_envs=2, threads=1))
     sim.add_robot(ks.bundled_robot("quadruped", uid="dog"))
-    sim.add_sensor("eye", ks.CameraCfg(width=16, height=16, parent="dog/base"))
+    sim.add_sensor("eye", ks.CameraCfg(width=16, height=16, extrinsics=ks.Extrinsics(parent="dog/base")))
     names = {"ks": ks, "sim": sim, "actions": np.zeros((2, 12))}
     exec(first, names)  # noqa: S102
     assert names["observations"].shape == (2, 15) and names["observations"].dtype == np.float32

@@ -99,39 +99,39 @@ class TerrainGenerator:
         return {"rough": value}
 
     @staticmethod
-    def slope(value: str | Mapping[str, Any]) -> dict[str, Any]:
+    def slope(value: SlopeTerrain | Mapping[str, Any]) -> dict[str, Any]:
         return {"slope": value}
 
     @staticmethod
-    def pyramid_stairs(value: str | Mapping[str, Any]) -> dict[str, Any]:
+    def pyramid_stairs(value: PyramidStairsTerrain | Mapping[str, Any]) -> dict[str, Any]:
         return {"pyramid_stairs": value}
 
     @staticmethod
-    def flat(value: str | Mapping[str, Any]) -> dict[str, Any]:
+    def flat(value: FlatTerrain | Mapping[str, Any]) -> dict[str, Any]:
         return {"flat": value}
 
     @staticmethod
-    def pyramid_slope(value: str | Mapping[str, Any]) -> dict[str, Any]:
+    def pyramid_slope(value: PyramidSlopeTerrain | Mapping[str, Any]) -> dict[str, Any]:
         return {"pyramid_slope": value}
 
     @staticmethod
-    def boxes(value: str | Mapping[str, Any]) -> dict[str, Any]:
+    def boxes(value: BoxesTerrain | Mapping[str, Any]) -> dict[str, Any]:
         return {"boxes": value}
 
     @staticmethod
-    def stepping_stones(value: str | Mapping[str, Any]) -> dict[str, Any]:
+    def stepping_stones(value: SteppingStonesTerrain | Mapping[str, Any]) -> dict[str, Any]:
         return {"stepping_stones": value}
 
     @staticmethod
-    def gap(value: str | Mapping[str, Any]) -> dict[str, Any]:
+    def gap(value: GapTerrain | Mapping[str, Any]) -> dict[str, Any]:
         return {"gap": value}
 
     @staticmethod
-    def waves(value: str | Mapping[str, Any]) -> dict[str, Any]:
+    def waves(value: WavesTerrain | Mapping[str, Any]) -> dict[str, Any]:
         return {"waves": value}
 
     @staticmethod
-    def discrete_obstacles(value: str | Mapping[str, Any]) -> dict[str, Any]:
+    def discrete_obstacles(value: DiscreteObstaclesTerrain | Mapping[str, Any]) -> dict[str, Any]:
         return {"discrete_obstacles": value}
 
     @staticmethod

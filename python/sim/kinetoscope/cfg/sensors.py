@@ -65,23 +65,23 @@ class RayPattern:
     """Starts and directions of the rays of a ray caster."""
 
     @staticmethod
-    def grid(value: str | Mapping[str, Any]) -> dict[str, Any]:
+    def grid(value: GridPattern | Mapping[str, Any]) -> dict[str, Any]:
         return {"grid": value}
 
     @staticmethod
-    def lidar(value: str | Mapping[str, Any]) -> dict[str, Any]:
+    def lidar(value: LidarPattern | Mapping[str, Any]) -> dict[str, Any]:
         return {"lidar": value}
 
     @staticmethod
-    def bpearl(value: str | Mapping[str, Any]) -> dict[str, Any]:
+    def bpearl(value: BpearlPattern | Mapping[str, Any]) -> dict[str, Any]:
         return {"bpearl": value}
 
     @staticmethod
-    def pinhole(value: str | Mapping[str, Any]) -> dict[str, Any]:
+    def pinhole(value: PinholePattern | Mapping[str, Any]) -> dict[str, Any]:
         return {"pinhole": value}
 
     @staticmethod
-    def custom(value: str | Mapping[str, Any]) -> dict[str, Any]:
+    def custom(value: CustomPattern | Mapping[str, Any]) -> dict[str, Any]:
         return {"custom": value}
 
 
@@ -143,42 +143,7 @@ class BpearlPattern:
     horizontal_resolution_deg: float = 10.0
     """Angle between neighboring azimuths [deg]."""
 
-    vertical_deg: Sequence[float] = field(
-        default_factory=lambda: [
-            89.5,
-            86.6875,
-            83.875,
-            81.0625,
-            78.25,
-            75.4375,
-            72.625,
-            69.8125,
-            67.0,
-            64.1875,
-            61.375,
-            58.5625,
-            55.75,
-            52.9375,
-            50.125,
-            47.3125,
-            44.5,
-            41.6875,
-            38.875,
-            36.0625,
-            33.25,
-            30.4375,
-            27.625,
-            24.8125,
-            22.0,
-            19.1875,
-            16.375,
-            13.5625,
-            10.75,
-            7.9375,
-            5.125,
-            2.3125,
-        ]
-    )
+    vertical_deg: Sequence[float] = field(default_factory=lambda: [89.5, 86.6875, 83.875, 81.0625, 78.25, 75.4375, 72.625, 69.8125, 67.0, 64.1875, 61.375, 58.5625, 55.75, 52.9375, 50.125, 47.3125, 44.5, 41.6875, 38.875, 36.0625, 33.25, 30.4375, 27.625, 24.8125, 22.0, 19.1875, 16.375, 13.5625, 10.75, 7.9375, 5.125, 2.3125])
     """Elevations of the beams [deg]: 0 is in the xy plane, 90 is along +z."""
 
 
