@@ -197,8 +197,8 @@ fn uniform_commands() {
         command = \"goal\"
     ";
     let task = |text: &str| {
-        let cfg = TaskCfg::from_toml(text).unwrap();
-        EnvBuilder::from_cfg(world(cfg(N, 1), false).0, &cfg, &TermRegistry::default()).unwrap().build().unwrap()
+        let (sim, task) = (world(cfg(N, 1), false).0, TaskCfg::from_toml(text).unwrap());
+        EnvBuilder::from_cfg(sim, &task, &TermRegistry::default()).unwrap().build().unwrap()
     };
     let mut env = task(text);
     assert_eq!(env.observation_space().names(), ["goal/x", "goal/a", "goal/same"]);
