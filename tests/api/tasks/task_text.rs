@@ -140,7 +140,11 @@ fn mistakes() {
         ("positions = [-0.1, 0.1]", "positions = [-0.1]", &["events.start"]),
         // Numbers are drawn from reversed ranges as from ranges in order, which hides the mistake.
         ("positions = [-0.1, 0.1]", "positions = [0.1, -0.1]", &["events.start", "positions", "0.1 to -0.1"]),
-        ("positions = [-0.1, 0.1]", "velocities = [0, nan]", &["events.start", "velocities", "finite"]),
+        (
+            "positions = [-0.1, 0.1]",
+            "positions = [0, 0]\nvelocities = [0, nan]",
+            &["events.start", "velocities", "finite"],
+        ),
         (
             "type = \"reset_joints_by_offset\"\npositions = [-0.1, 0.1]",
             "type = \"reset_root_uniform\"\nrpy = [[0, 0], [0, 0], [1, -1]]",
