@@ -16,6 +16,9 @@ const NOT_FOUND: &str = "MuJoCo was not found: install it (Debian 12: apt-get in
                          or set MUJOCO_DIR to a folder with include/mujoco and libmujoco.so* of MuJoCo 2.2.2 or 4.x,\n\
                          or enable the feature `download` of kinetoscope, which gets MuJoCo 4.0.1 from PyPI by pip";
 
+/// Name of a library of `MUJOCO_DIR` for the linker.
+const LINKED: &str = "mujoco-of-mujoco-dir";
+
 /// Version of MuJoCo that the feature `download` gets.
 const DOWNLOADED: &str = "4.0.1";
 
@@ -124,12 +127,16 @@ impl Installation {
         // Cargo adds only link-search folders below OUT_DIR to the library path of `cargo run` and `cargo test`. A
         // symlink there lets tests and examples find a library outside the system's search path.
         let out = PathBuf::from(env::var_os("OUT_DIR").expect("cargo sets OUT_DIR"));
-        let link = out.join(name);
-        let _ = fs::remove_file(&link);
-        #[cfg(unix)]
-        std::os::unix::fs::symlink(library, &link).expect("OUT_DIR is writable");
+        // A second link for the linker: not every linker finds the versioned name. Its name is unlike that of the library,
+        // so that no library of a system folder is linked instead. Programs load the library by its SONAME.
+        for link in [name, &format!("lib{LINKED}.so")] {
+            let link = out.join(link);
+            let _ = fs::remove_file(&link);
+            #[cfg(unix)]
+            std::os::unix::fs::symlink(library, &link).expect("OUT_DIR is writable");
+        }
         println!("cargo::rustc-link-search=native={}", out.display());
-        println!("cargo::rustc-link-lib=dylib:+verbatim={name}");
+        println!("cargo::rustc-link-lib=dylib={LINKED}");
     }
 }
 
@@ -147,7 +154,9 @@ fn download(out: &Path) -> Result<PathBuf, String> {
     };
     let failed = |error: std::io::Error| format!("{}: {error}", out.display());
     let (requirements, wheels, scratch) = (out.join("wheel.txt"), out.join("wheels"), out.join("wheel.tmp"));
-    for folder in [&wheels, &scratch] {
+    // A folder of an earlier build that is not complete, or has another version, cannot be the target of the rename.
+    let complete = out.join("wheel");
+    for folder in [&wheels, &scratch, &complete] {
         if folder.exists() {
             fs::remove_dir_all(folder).map_err(failed)?;
         }
@@ -165,7 +174,7 @@ fn download(out: &Path) -> Result<PathBuf, String> {
     let wheel = wheel.ok_or("pip downloaded no wheel of mujoco-core")?.path();
     run(Command::new("python3").args(["-m", "zipfile", "-e"]).arg(&wheel).arg(&scratch))?;
     // Renamed at the end: a folder of that name is complete.
-    fs::rename(&scratch, out.join("wheel")).map_err(failed)?;
+    fs::rename(&scratch, complete).map_err(failed)?;
     Ok(unpacked)
 }
 

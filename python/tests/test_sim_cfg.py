@@ -15,6 +15,13 @@ from kinetoscope import _sim, cfg
 CLASSES = [cls for _, cls in inspect.getmembers(cfg, inspect.isclass) if dataclasses.is_dataclass(cls)]
 ENTITIES = [cls for cls in CLASSES if hasattr(cls, "_type")]
 
+
+def grid(*tiles):
+    """A terrain of a row of tiles, of medium difficulty."""
+    sizes = {"rows": 1, "columns": 4, "difficulty": [0.5, 0.5], "border": 0}
+    return {"type": "terrain", "heights": {"grid": {**sizes, "tiles": list(tiles)}}}
+
+
 # A configuration that contains an object of a class; classes without an entry are entities themselves.
 CONTAINERS = {
     "ActuatorStateCfg": lambda own: own,
@@ -51,6 +58,15 @@ CONTAINERS = {
     "SlopeTerrain": lambda own: {"type": "terrain", "heights": {"slope": own}},
     "SurfaceCfg": lambda own: {"type": "rigid_object", "surface": own},
     "TargetFrameCfg": lambda own: {"type": "frame_transformer", "source": "a", "targets": [own]},
+    "RoughTile": lambda own: grid({"tile": {"rough": own}}),
+    "SlopeTile": lambda own: grid({"tile": {"slope_up": own}}),
+    "StairsTile": lambda own: grid({"tile": {"stairs_down": own}}),
+    "BoxesTile": lambda own: grid({"tile": {"boxes": own}}),
+    "SteppingStonesTile": lambda own: grid({"tile": {"stepping_stones": own}}),
+    "GapTile": lambda own: grid({"tile": {"gap": own}}),
+    "WavesTile": lambda own: grid({"tile": {"waves": own}}),
+    "ObstaclesTile": lambda own: grid({"tile": {"discrete_obstacles": own}}),
+    "TileShare": lambda own: grid(own, {"tile": {"waves": {}}}),
     "UrdfCfg": lambda own: {"type": "robot", "urdf": own},
 }
 SIMULATION = {
@@ -60,12 +76,13 @@ SIMULATION = {
     "Shard": lambda own: {"shard": own},
 }
 # Read by other functions than scene files.
-ELSEWHERE = {"IkCfg", "NullSpacePosture", "Randomization", "RandomizationTerm"}
+ELSEWHERE = {"IkCfg", "NullSpacePosture", "Randomization", "RandomizationTerm", "TerrainGrid"}
 REQUIRED = {
     "ComponentCfg": {"name": "a", "urdf": "a.urdf"},
     "DcMotor": {"saturation_effort": 1.0},
     "Aperture": {"focal_length": 0.05, "f_number": 2.0, "focus_distance": 1.0},
     "TargetFrameCfg": {"bodies": "a"},
+    "TileShare": {"tile": {"flat": {}}},
     "FrameTransformerCfg": {"source": "a", "targets": []},
     "NullSpacePosture": {"rest": [0.0]},
     "RandomizationTerm": {"property": "mass", "pattern": ".*", "draw": {"scale": [1, 2]}},
@@ -118,13 +135,14 @@ def test_defaults_are_those_of_rust(cls):
             assert any(table.get(field.name, False) is False for table in own), field.name
 
 
-@pytest.mark.parametrize("name", ["IkCfg", "NullSpacePosture", "Randomization"])
+@pytest.mark.parametrize("name", ["IkCfg", "NullSpacePosture", "Randomization", "TerrainGrid"])
 def test_defaults_of_arguments_are_those_of_rust(name):
-    """Configurations of calls, which scene files do not have. All fields of RandomizationTerm are required."""
+    """Configurations of calls, which scene files do not have, and the terrain grid, whose heights are too many for a text.
+    All fields of RandomizationTerm are required."""
     required = {"NullSpacePosture": {"rest": []}}.get(name, {})
     cls = getattr(ks, name)
     assert tomllib.loads(_sim._default_fields(name)) == all_fields(cls(**required))
-    assert ELSEWHERE == {"IkCfg", "NullSpacePosture", "Randomization", "RandomizationTerm"}
+    assert ELSEWHERE == {"IkCfg", "NullSpacePosture", "Randomization", "RandomizationTerm", "TerrainGrid"}
 
 
 def tables(value):

@@ -568,6 +568,11 @@ def test_rigid_objects_frames_and_imus_of_isaac():
     before = np.asarray(body.data.root_state_w)
     scene.native.update(1)
     np.testing.assert_allclose(np.asarray(body.data.root_lin_vel_w), [[0, 0.2, -0.981]] * 2, atol=1e-5)
+    # Bodies of both kinds of assets, against the native poses.
+    for asset, poses in ((body, body.native.pose[:, None]), (scene["robot"], scene["robot"].native.link_poses)):
+        np.testing.assert_allclose(np.asarray(asset.data.body_pos_w), poses[..., :3] + origins[:, None], atol=1e-6)
+        np.testing.assert_allclose(np.asarray(asset.data.body_quat_w), poses[..., 3:], atol=1e-6)
+        np.testing.assert_allclose(np.asarray(asset.data.root_quat_w), asset.data.body_quat_w[:, 0], atol=1e-6)
     imu = scene["imu"].data
     np.testing.assert_allclose(np.asarray(imu.lin_acc_b), 0, atol=1e-4)
     np.testing.assert_allclose(np.asarray(imu.pos_w), before[:, :3] + [0.1, 0, 0], atol=1e-5)

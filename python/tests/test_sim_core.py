@@ -223,6 +223,14 @@ def test_names_and_collections(arm_sim):
     assert "arm" in repr(sim) and "6 joints" in repr(arm)
     html = arm._repr_html_()
     assert html.count("<tr>") == 7 and "JOINT6" in html
+    # The links are a tree: each is one level below its parent, with the joint between them.
+    tree = html[html.index("<pre>") + 5 : html.index("</pre>")].splitlines()
+    names = [line.strip().split(" (")[0] for line in tree]
+    assert sorted(names) == sorted(arm.link_names)
+    depths = [len(line) - len(line.lstrip()) for line in tree]
+    assert depths[0] == 0 and "(" not in tree[0] and all(after <= before + 2 for before, after in zip(depths, depths[1:], strict=False))
+    at = names.index("link3")
+    assert tree[at].endswith("link3 (JOINT3)") and names[at - 1] == "link2" and depths[at] == depths[at - 1] + 2
 
 
 def test_pickles(arm_sim):

@@ -8,6 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
+import kinetoscope as ks
+
 FOLDER = Path(__file__).parents[1] / "examples"
 
 
@@ -39,6 +41,22 @@ def test_dataset(tmp_path):
     assert archive["mask"].shape == (3, 128, 128) and archive["color"].shape == (3, 128, 128, 4)
     # Three cubes and the ground.
     assert len(np.unique(archive["mask"])) == 4
+
+
+def test_tasks_of_the_page():
+    """The tasks in docs/python.md."""
+    page = (FOLDER.parents[1] / "docs" / "python.md").read_text()
+    first, second = (code for code in re.findall(r"```python\n(.*?)```", page, re.DOTALL) if "ks.Task(" in code)
+    sim = ks.SimulationManager(ks.SimulationManagerCfg.legged(num_envs=2, threads=1))
+    sim.add_robot(ks.bundled_robot("quadruped", uid="dog"))
+    sim.add_sensor("eye", ks.CameraCfg(width=16, height=16, extrinsics=ks.Extrinsics(parent="dog/base")))
+    names = {"ks": ks, "sim": sim, "actions": np.zeros((2, 12))}
+    exec(first, names)  # noqa: S102
+    assert names["observations"].shape == (2, 15) and names["observations"].dtype == np.float32
+    assert names["task"].images("critic", "view").shape == (2, 16, 16, 3)
+    names = {"ks": ks}
+    exec(second, names)  # noqa: S102
+    assert set(names["levels"]) <= {0, 1, 2} and len(names["levels"]) == 64
 
 
 def test_notebook():

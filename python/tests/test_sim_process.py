@@ -176,6 +176,27 @@ def test_import_is_fast():
     assert both - numpy < 0.15, (both, numpy)
 
 
+def test_images_are_copied_once(tmp_path):
+    """The memory of a process grows by one array per image that is read, without a copy in between, and not at all for an
+    array of the caller. Arrays of 39 MB are mapped one by one, so that memory that was used before does not hide the peak."""
+    code = (
+        "import resource\nimport numpy as np\nimport kinetoscope as ks\n"
+        "sim = ks.SimulationManager(num_envs=32, threads=1)\nsim.add_rigid_object(uid='cube')\n"
+        "cam = sim.add_sensor('c', ks.CameraCfg(width=640, height=480))\nmine = np.ones_like(cam['color'])\n"
+        "peak = lambda: 1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / mine.nbytes\n"
+        # The first arrays stay below the peak of the rendering.
+        "kept, peaks = [cam['color'] for _ in range(3)], [peak()]\n"
+        "for act in (lambda: kept.append(cam['color']), lambda: cam.read('color', out=mine), lambda: kept.extend([cam['color'].copy()])):\n"
+        "    act()\n    peaks.append(peak())\n"
+        "print(*np.diff(peaks))"
+    )
+    result = python(code, cwd=tmp_path)
+    read, into, copied = map(float, result.stdout.split())
+    assert 0.9 < read < 1.1 and into < 0.1, result.stdout
+    # A control: another copy is seen.
+    assert copied > 1.9, result.stdout
+
+
 def test_first_image_is_fast():
     """From the start of the import to an image of an arm, 640 x 480 pixels: less than 0.5 s."""
     code = (

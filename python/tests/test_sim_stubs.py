@@ -42,6 +42,10 @@ def test_types_of_a_program(strict, tmp_path):
         "arm.set_qpos_target([0.0], joint_ids='arm')\n"
         "shape: tuple[int, ...] = arm.qpos.shape\n"
         "box = ks.ObjectShape.box(size=[1, 1, 1])\n"
+        "rays = ks.RayPattern.grid(ks.GridPattern(resolution=0.5))\n"
+        "tile = ks.TileShare(tile=ks.TerrainTile.stairs_up(ks.StairsTile(tread=0.4)), share=2.0)\n"
+        "hills = ks.TerrainGenerator.grid(ks.TerrainGrid(tiles=[tile]))\n"
+        "waves = ks.TerrainGenerator.waves(ks.WavesTerrain())\n"
     )
     assert run("mypy", "--config-file", strict, str(program)).returncode == 0
     # A control: mistakes are found.

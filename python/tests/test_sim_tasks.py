@@ -22,9 +22,11 @@ def task_cfg(**changes):
         "decimation": 2,
         "actions": {"push": PUSH},
         "observations": {
-            "place": {"type": "joint_pos_rel", "robot": "cart", "joints": [".*"]},
-            "speed": {"type": "joint_vel", "robot": "cart", "joints": [".*"], "scale": 10.0, "clip": [-1.0, 1.0]},
-            "last": {"type": "last_action"},
+            "policy": {
+                "place": {"type": "joint_pos_rel"},
+                "speed": {"type": "joint_vel", "robot": "cart", "joints": [".*"], "scale": 10.0, "clip": [-1.0, 1.0]},
+                "last": {"type": "last_action"},
+            }
         },
         "rewards": {"alive": {"type": "is_alive", "weight": 1.0}, "rate": {"type": "action_rate", "weight": -0.5}},
         **changes,
@@ -67,11 +69,11 @@ def test_steps_are_those_of_the_simulation():
 def test_episodes():
     cfg = task_cfg(
         episode_steps=5,
-        commands={"goal": {"columns": {"x": [0.2, 0.4], "y": [7, 7]}}},
+        commands={"goal": {"type": "uniform_command", "columns": {"x": [0.2, 0.4], "y": [7, 7]}}},
         terminations={"away": {"type": "joint_out_of_limits", "robot": "cart", "joints": ["slide"]}},
-        events={"start": {"type": "reset_joints_by_offset", "robot": "cart", "joints": ["slide"], "positions": [-0.1, 0.1]}},
+        events={"start": {"type": "reset_joints_by_offset", "robot": "cart", "joints": ["slide"], "positions": [-0.1, 0.1], "velocities": [0, 0]}},
     )
-    cfg["observations"] = {
+    cfg["observations"]["policy"] = {
         "goal": {"type": "generated_commands", "command": "goal"},
         "place": {"type": "joint_pos_rel", "robot": "cart", "joints": [".*"]},
     }
@@ -110,11 +112,13 @@ def test_terms_of_legged_robots():
         {
             "decimation": 4,
             "actions": {"legs": {"type": "relative_joint_positions", **robot, "joints": [".*"], "step": 0.01}},
-            "commands": {"velocity": {"columns": {"x": [0.5, 0.5], "y": [0, 0]}}},
+            "commands": {"velocity": {"type": "uniform_command", "columns": {"x": [0.5, 0.5], "y": [0, 0]}}},
             "observations": {
-                "linear": {"type": "base_lin_vel", **robot},
-                "angular": {"type": "base_ang_vel", **robot},
-                "up": {"type": "projected_gravity", **robot, "noise": 0.01},
+                "policy": {
+                    "linear": {"type": "base_lin_vel", **robot},
+                    "angular": {"type": "base_ang_vel", **robot},
+                    "up": {"type": "projected_gravity", **robot, "noise": {"std": 0.01}},
+                }
             },
             "rewards": {
                 "track": {"type": "track_lin_vel", "weight": 2.0, **robot, "command": "velocity", "std": 0.5},
@@ -125,7 +129,7 @@ def test_terms_of_legged_robots():
                 "fallen": {"type": "bad_orientation", **robot, "angle": 1.0},
                 "low": {"type": "root_height_below_minimum", **robot, "height": 0.2},
                 "touch": {"type": "illegal_contact", "sensor": "base", "force": 1.0},
-                "time": {"type": "time_out", "steps": 8},
+                "time": {"type": "time_out", "steps": 8, "truncating": True},
             },
             "events": {"start": {"type": "reset_root_uniform", **robot, "position": [[-1, 1], [-1, 1], [0, 0]]}},
         },
@@ -147,20 +151,164 @@ def test_terms_of_legged_robots():
     assert truncated.all() and [ended["reason"] for ended in info["ended"]] == ["time", "time"]
 
 
+@pytest.mark.parametrize(("mode", "first_of_next"), [("same_step", 1), ("next_step", 0), ("disabled", 0)])
+def test_autoreset_modes(mode, first_of_next):
+    """The step that ends an episode returns the first observation of the next one in the mode same_step, else the last."""
+    cfg = task_cfg(episode_steps=2, autoreset=mode)
+    cfg["observations"]["policy"] = {"place": {"type": "joint_pos_rel"}}
+    task = ks.Task(cart_sim()[0], cfg)
+    task.reset()
+    push = np.full((3, 1), 5.0)
+    task.step(push)
+    observations, _, _, truncated, info = task.step(push)
+    assert truncated.all() and (info["final_observations"] > 0).all()
+    assert (observations == (0 if first_of_next else info["final_observations"])).all()
+    if mode == "disabled":
+        with pytest.raises(ks.ArgumentError, match="automatic resets are disabled"):
+            task.step(push)
+        observations, _ = task.reset(mask=[True] * 3)
+        assert (observations == 0).all()
+    else:
+        observations, rewards, _, truncated, _ = task.step(push)
+        assert not truncated.any() and (rewards != 0).all() == first_of_next
+        assert (observations != 0).all() == first_of_next
+
+
+def test_groups_and_images():
+    sim, cart = cart_sim()
+    look = ks.Placement.look_at(eye=[0, -2, 0.5], target=[0, 0, 0])
+    cfg = ks.CameraCfg(width=20, height=10, channels=["rgb", "depth"], extrinsics=ks.Extrinsics(placement=look))
+    eye = sim.add_sensor("eye", cfg)
+    cfg = task_cfg(episode_steps=3)
+    cfg["observations"]["critic"] = {
+        "speed": {"type": "joint_vel"},
+        "view": {"type": "camera_rgb", "camera": "eye"},
+        "near": {"type": "camera_depth", "camera": "eye", "range": [0.5, 4.0]},
+    }
+    task = ks.Task(sim, cfg)
+    assert task.group_names == ["policy", "critic"]
+    assert task.group_space("critic")[0] == ["speed/slide"] and task.group_space("policy") == task.observation_space
+    assert task.image_spaces("policy") == {}
+    spaces = task.image_spaces("critic")
+    assert spaces == {"view": ((10, 20, 3), "uint8", 0.0, 255.0), "near": ((10, 20, 1), "float32", 0.5, 4.0)}
+    task.reset()
+    for step in range(1, 4):
+        observations, *_, info = task.step(np.full((3, 1), 5.0))
+        np.testing.assert_array_equal(task.observations("policy"), observations)
+        np.testing.assert_array_equal(task.observations("policy", final=True), info["final_observations"])
+        np.testing.assert_array_equal(task.observations("critic"), cart.qvel)
+        np.testing.assert_array_equal(task.images("critic", "view"), eye["rgb"][..., :3])
+        np.testing.assert_array_equal(task.images("critic", "near")[..., 0], eye["depth"].clip(0.5, 4.0))
+    # The episode has ended in the last step: the next one begins at rest.
+    assert (task.observations("critic") == 0).all() and (task.observations("critic", final=True) > 0).all()
+    assert (task.images("critic", "view") != task.images("critic", "view", final=True)).any()
+    for call, word in [
+        (lambda: task.observations("crtic"), "critic"),
+        (lambda: task.images("critic", "veiw"), "view"),
+        (lambda: task.group_space("x"), "policy"),
+    ]:
+        with pytest.raises(ks.UnknownNameError, match=word):
+            call()
+
+
+def test_single_precision():
+    tasks = [ks.Task(cart_sim()[0], task_cfg(), **dtype) for dtype in ({}, {"dtype": "float32"})]
+    double, single = ([task.reset(seed=1)[0]] for task in tasks)
+    for _ in range(3):
+        for task, seen in zip(tasks, (double, single), strict=True):
+            observations, *_, info = task.step(np.full((3, 1), 1 / 3))
+            seen += [observations, info["final_observations"], task.observations("policy")]
+    for wide, narrow in zip(double, single, strict=True):
+        assert (wide.dtype, narrow.dtype) == (np.float64, np.float32)
+        np.testing.assert_array_equal(wide.astype(np.float32), narrow)
+    # A control: the numbers need more digits.
+    assert (double[-1] != single[-1]).any()
+    with pytest.raises(ks.ArgumentError, match="float16.*float32"):
+        ks.Task(cart_sim()[0], task_cfg(), dtype="float16")
+
+
+def test_curricula_on_a_terrain_grid():
+    """A robot that is carried beyond half a tile moves up a row, one that stays moves down."""
+    grid = ks.TerrainGrid(
+        tile_size=[4.0, 4.0],
+        rows=3,
+        columns=2,
+        platform=1.0,
+        border=1.0,
+        tiles=[
+            ks.TileShare(tile=ks.TerrainTile.stairs_up(ks.StairsTile(step_height=[0.1, 0.2]))),
+            ks.TileShare(tile=ks.TerrainTile.flat()),
+        ],
+    )
+    sim = ks.SimulationManager(ks.SimulationManagerCfg.legged(num_envs=4, threads=1, ground=None))
+    terrain = sim.add_terrain(heights=ks.TerrainGenerator.grid(grid))
+    # Platforms of rows of difficulty 0, 0.5 and 1 after (4 - 1) / 2 / 0.3 = 5 steps, and the flat tiles.
+    for row in range(3):
+        assert terrain.height_at(4 * (row - 1), -2) == pytest.approx(5 * (0.1 + 0.05 * row), abs=1e-6)
+        assert terrain.height_at(4 * (row - 1), 2) == pytest.approx(0, abs=1e-6)
+    dog = sim.add_robot(ks.bundled_robot("quadruped", uid="dog"))
+    task = ks.Task(
+        sim,
+        {
+            "episode_steps": 1,
+            "actions": {"legs": {"type": "relative_joint_positions", "step": 0.01}},
+            "observations": {"policy": {"joints": {"type": "joint_pos_rel"}}},
+            "curricula": {"level": {"type": "terrain_levels", "grid": grid, "max_initial_level": 1}},
+            "events": {"start": {"type": "reset_root_on_terrain", "grid": grid, "curriculum": "level"}},
+        },
+    )
+    assert task.curriculum_names == ["level"]
+    task.set_curriculum("level", [0, 1, 1, 2])
+    task.reset()
+    np.testing.assert_allclose(dog.root_pose[:, :2], [[-4, -2], [0, 2], [0, -2], [4, 2]])
+    heights = [terrain.height_at(*place) for place in dog.root_pose[:, :2]]
+    np.testing.assert_allclose(dog.root_pose[:, 2] - heights, dog.default_root_state[:, 2], atol=1e-6)
+    moved = dog.root_pose
+    moved[[0, 1], 0] += 2.5
+    dog.write_root_pose(moved)
+    task.step(np.zeros((4, 12)))
+    np.testing.assert_array_equal(task.curriculum("level"), [1, 2, 0, 1])
+    for name, values, error in [("lvel", [0] * 4, ks.UnknownNameError), ("level", [0], ks.ArgumentError)]:
+        with pytest.raises(error, match="level"):
+            task.set_curriculum(name, values)
+
+
+def policy(term):
+    return {"observations": {"policy": {"x": term}}}
+
+
+def command(columns):
+    return {"commands": {"c": {"type": "uniform_command", "columns": columns}}}
+
+
+def start(kind, **ranges):
+    return {"events": {"e": {"type": kind, **ranges}}}
+
+
 @pytest.mark.parametrize(
     ("change", "error", "text"),
     [
-        ({"actions": {"push": {**PUSH, "type": "joint_effort"}}}, ks.ConfigError, "actions.push.*joint_effort.*relative_joint_positions"),
+        ({"actions": {"push": {**PUSH, "type": "joint_effort"}}}, ks.UnknownNameError, "actions.push.*joint_effort.*relative_joint_positions"),
         ({"actions": {"push": {**PUSH, "bond": 1.0}}}, ks.ConfigError, "actions.push.*bond"),
-        ({"actions": {"push": {**PUSH, "robot": "crat"}}}, ks.UnknownNameError, 'unknown entity "crat".*"cart"'),
-        ({"actions": {"push": {**PUSH, "joints": ["slid"]}}}, ks.KinetoscopeError, "slide"),
+        ({"actions": {"push": {**PUSH, "robot": "crat"}}}, ks.UnknownNameError, 'actions.push: unknown robot "crat".*cart'),
+        ({"actions": {"push": {**PUSH, "joints": ["slid"]}}}, ks.UnknownNameError, "actions.push.*slide"),
         ({"actions": {"push": {**PUSH, "bound": -1.0}}}, ks.ConfigError, "slide"),
         ({"actions": {}}, ks.ConfigError, "action"),
-        ({"observations": {"x": {"type": "last_action", "sclae": 1.0}}}, ks.ConfigError, "observations.x.*sclae"),
-        ({"observations": {"x": {"type": "generated_commands", "command": "goal"}}}, ks.UnknownNameError, "goal"),
-        ({"observations": {"x": {"type": "last_action", "scale": 0.0}}}, ks.ConfigError, "scale"),
-        ({"commands": {"c": {"columns": {}}}}, ks.ConfigError, "commands.c: 0 columns"),
-        ({"terminations": {"t": {"type": "illegal_contact", "sensor": "s", "force": 1.0}}}, ks.UnknownNameError, "contact sensor"),
+        (policy({"type": "last_action", "sclae": 1.0}), ks.ConfigError, "observations.policy.x.*sclae"),
+        (policy({"type": "generated_commands", "command": "goal"}), ks.UnknownNameError, "observations.policy.x.*goal"),
+        (policy({"type": "last_action", "scale": 0.0}), ks.ConfigError, "scale"),
+        (policy({"type": "last_action", "clip": [1, -1]}), ks.ConfigError, "bounds"),
+        (policy({"type": "last_action", "noise": 0.1}), ks.ConfigError, "observations.policy.x.noise"),
+        (policy({"type": "last_action", "noise": {"low": 1, "high": 0}}), ks.ConfigError, "in order"),
+        ({"observations": {"x": {"type": "last_action"}}}, ks.ConfigError, "observations.policy.x"),
+        (command({}), ks.ConfigError, "commands.c.*at least one column"),
+        (command({"x": [2, 1]}), ks.ConfigError, "commands.c.*2 to 1.*in order"),
+        (command({"x": [float("nan"), 1]}), ks.ConfigError, "commands.c.*finite"),
+        (start("reset_joints_by_offset", positions=[0.1, -0.1], velocities=[0, 0]), ks.ConfigError, "events.e.*positions.*in order"),
+        (start("reset_root_uniform", angular=[[0, 0], [0, 0], [1, 0]]), ks.ConfigError, "events.e.*angular.*in order"),
+        ({"terminations": {"t": {"type": "illegal_contact", "sensor": "s", "force": 1.0}}}, ks.UnknownNameError, 'sensor.*"s"'),
+        ({"curricula": {"c": {"type": "terrain_level"}}}, ks.UnknownNameError, "terrain_levels"),
+        ({"autoreset": "next"}, ks.UnknownNameError, "next_step"),
         ({"decimation": 0}, ks.ConfigError, "decimation"),
         ({"rewrads": {}}, ks.ConfigError, "rewrads"),
     ],

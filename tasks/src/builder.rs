@@ -19,9 +19,9 @@ use kinetoscope_sim::SimulationManager;
 /// Builds an [`Env`] from terms. Terms act in the order in which they are added.
 #[derive(Debug)]
 pub struct EnvBuilder {
-    sim: SimulationManager,
+    pub(crate) sim: SimulationManager,
     cfg: EnvCfg,
-    terms: Terms,
+    pub(crate) terms: Terms,
 }
 
 /// The terms of a task.
@@ -185,7 +185,7 @@ impl EnvBuilder {
 
 impl Terms {
     /// Returns the group called `name`, which is added if it is new.
-    fn group(&mut self, name: &str) -> &mut Group {
+    pub(crate) fn group(&mut self, name: &str) -> &mut Group {
         let index = self.groups.iter().position(|group| group.name == name).unwrap_or_else(|| {
             self.groups.push(Group::new(name));
             self.groups.len() - 1

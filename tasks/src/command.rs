@@ -58,6 +58,15 @@ impl CommandTerm {
         Self { name: name.into(), columns, drawn: D, sample, resampling: None, update: Some(Box::new(update)) }
     }
 
+    /// Creates a term with independent, uniformly distributed columns.
+    pub(crate) fn uniform(name: &str, columns: Vec<(String, [f64; 2])>) -> Self {
+        let (columns, ranges): (Vec<String>, Vec<[f64; 2]>) = columns.into_iter().unzip();
+        let drawn = columns.len();
+        let sample: SampleCommand =
+            Box::new(move |rng| ranges.iter().map(|[low, high]| rng.uniform_range(*low, *high)).collect());
+        Self { name: name.into(), columns, drawn, sample, resampling: None, update: None }
+    }
+
     /// Draws the numbers again during an episode, after random times of `seconds` (lowest and highest, uniformly
     /// distributed), rounded up to whole steps of the task. A new draw comes after the rewards and before the
     /// observations of a step.

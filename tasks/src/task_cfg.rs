@@ -103,6 +103,16 @@ impl EnvBuilder {
     /// missing or out of range. The error names the term.
     pub fn from_cfg(sim: SimulationManager, cfg: &TaskCfg, registry: &TermRegistry) -> Result<Self> {
         let mut builder = Self::new(sim, cfg.env_cfg()?);
+        builder.add_terms(cfg, registry)?;
+        Ok(builder)
+    }
+
+    /// Adds the terms of `cfg`, whose types are those of `registry`; the lengths and the mode of `cfg` are not used.
+    ///
+    /// # Errors
+    /// Those of [`from_cfg`](Self::from_cfg). The builder then has the terms before the invalid one, and
+    /// [`into_sim`](Self::into_sim) returns the unchanged simulation.
+    pub fn add_terms(&mut self, cfg: &TaskCfg, registry: &TermRegistry) -> Result<()> {
         for (kind, terms) in [
             (TermKind::Action, &cfg.actions),
             (TermKind::Command, &cfg.commands),
@@ -112,25 +122,25 @@ impl EnvBuilder {
             (TermKind::Termination, &cfg.terminations),
         ] {
             for (name, value) in terms {
-                let place = format!("{}.{name}", table_name(kind));
-                builder = builder.add(kind, &place, name, value, registry)?;
+                self.add(kind, &format!("{}.{name}", table_name(kind)), name, value, registry)?;
             }
         }
         for (group, terms) in &cfg.observations {
             let place = format!("observations.{group}");
-            let Value::Table(terms) = terms else {
+            let is_term = |table: &Table| table.get("type").is_some_and(Value::is_str);
+            let Some(terms) = terms.as_table().filter(|terms| !is_term(terms)) else {
                 let error = format!("it must be a group of terms, such as [observations.{POLICY_GROUP}.{group}]");
                 return Err(EnvError::TaskText { place, error });
             };
             for (name, value) in terms {
-                builder = builder.add_observation(group, &format!("{place}.{name}"), name, value, registry)?;
+                self.add_observation(group, &format!("{place}.{name}"), name, value, registry)?;
             }
         }
-        Ok(builder)
+        Ok(())
     }
 
     /// Adds a term of any kind but observations.
-    fn add(self, kind: TermKind, place: &str, name: &str, value: &Value, registry: &TermRegistry) -> Result<Self> {
+    fn add(&mut self, kind: TermKind, place: &str, name: &str, value: &Value, registry: &TermRegistry) -> Result<()> {
         let mut table = table(place, value)?;
         let of_type = take_type(kind, place, &mut table)?;
         let weight = match kind {
@@ -145,57 +155,45 @@ impl EnvBuilder {
             _ => false,
         };
         let columns = self.columns();
-        let args = TermArgs::new(self.sim(), &columns, (name, place), weight.unwrap_or(1.0), table);
-        Ok(match kind {
-            TermKind::Action => {
-                let term = registry.actions.make(kind, &of_type, args)?;
-                self.action(term)
-            }
-            TermKind::Command => {
-                let term = registry.commands.make(kind, &of_type, args)?;
-                self.command(term)
-            }
-            TermKind::Curriculum => {
-                let term = registry.curricula.make(kind, &of_type, args)?;
-                self.curriculum(term)
-            }
-            TermKind::Event => {
-                let term = registry.events.make(kind, &of_type, args)?;
-                self.event(term)
-            }
-            TermKind::Reward => {
-                let term = registry.rewards.make(kind, &of_type, args)?;
-                self.reward(term)
-            }
+        let args = TermArgs::new(&self.sim, &columns, (name, place), weight.unwrap_or(1.0), table);
+        let terms = &mut self.terms;
+        match kind {
+            TermKind::Action => terms.actions.push(registry.actions.make(kind, &of_type, args)?),
+            TermKind::Command => terms.commands.push(registry.commands.make(kind, &of_type, args)?),
+            TermKind::Curriculum => terms.curricula.push(registry.curricula.make(kind, &of_type, args)?),
+            TermKind::Event => terms.events.push(registry.events.make(kind, &of_type, args)?),
+            TermKind::Reward => terms.rewards.push(registry.rewards.make(kind, &of_type, args)?),
             _ => {
                 let term = registry.terminations.make(TermKind::Termination, &of_type, args)?;
-                self.termination(if truncating { term.truncating() } else { term })
+                terms.terminations.push(if truncating { term.truncating() } else { term });
             }
-        })
+        }
+        Ok(())
     }
 
     /// Adds an observation term, or images, to a group.
     fn add_observation(
-        self,
+        &mut self,
         group: &str,
         place: &str,
         name: &str,
         value: &Value,
         registry: &TermRegistry,
-    ) -> Result<Self> {
+    ) -> Result<()> {
         let mut table = table(place, value)?;
         let kind = TermKind::Observation;
         let of_type = take_type(kind, place, &mut table)?;
         let columns = self.columns();
         if registry.images.has(&of_type) {
-            let args = TermArgs::new(self.sim(), &columns, (name, place), 1.0, table);
+            let args = TermArgs::new(&self.sim, &columns, (name, place), 1.0, table);
             let term: ImageTerm = registry.images.make(kind, &of_type, args)?;
-            return Ok(self.image_in(group, term));
+            self.terms.group(group).images.push(term);
+            return Ok(());
         }
         let noise: Option<NoiseCfg> = take(place, &mut table, "noise")?;
         let clip: Option<[f64; 2]> = take(place, &mut table, "clip")?;
         let scale = take_number(place, &mut table, "scale")?;
-        let args = TermArgs::new(self.sim(), &columns, (name, place), 1.0, table);
+        let args = TermArgs::new(&self.sim, &columns, (name, place), 1.0, table);
         let names = registry.images.names();
         let mut term: ObservationTerm = registry.observations.make_or(kind, &of_type, args, &names)?;
         if let Some(noise) = noise {
@@ -207,7 +205,8 @@ impl EnvBuilder {
         if let Some(scale) = scale {
             term = term.scaled(scale);
         }
-        Ok(self.observation_in(group, term))
+        self.terms.group(group).terms.push(term);
+        Ok(())
     }
 }
 

@@ -22,6 +22,7 @@ terms! {
     terrain_levels: reset_root_on_terrain, terrain_levels, TerrainLevelsCfg;
     time_out: time_out;
     track_lin_vel: track_lin_vel;
+    uniform_command: uniform_command;
     uniform_velocity: uniform_velocity, UniformVelocityCfg;
 }
 
@@ -29,12 +30,22 @@ mod named;
 
 use crate::action::ActionTerm;
 use crate::context::TermContext;
-use crate::error::{Result, TermResult};
+use crate::error::{EnvError, Result, TermKind, TermResult};
 use crate::observation::ObservationTerm;
 use crate::reward::RewardTerm;
 use crate::space::Space;
 use kinetoscope_sim::{JointIndex, Robot, RobotId, SimulationManager};
 use ndarray::{Array1, Array2, Axis};
+
+/// Checks that both ends of the range `field` of a term are finite and in order.
+fn check_range(kind: TermKind, name: &str, field: &str, [low, high]: [f64; 2]) -> Result<()> {
+    if low.is_finite() && high.is_finite() && low <= high {
+        return Ok(());
+    }
+    let field = format!("{field} of the {kind} term {name:?}");
+    let (value, expected) = (format!("{low} to {high}"), "both numbers must be finite, in order");
+    Err(EnvError::Config { field, value, expected })
+}
 
 /// Finds the joints of a robot that match `patterns`, with their names.
 fn find_joints(sim: &SimulationManager, robot: RobotId, patterns: &[&str]) -> Result<(Vec<String>, Vec<JointIndex>)> {

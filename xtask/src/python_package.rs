@@ -51,7 +51,7 @@ pub(crate) struct WheelArgs {
     /// Also write a source distribution of kinetoscope-render
     #[arg(long)]
     sdist: bool,
-    /// Link kinetoscope-render with glibc 2.28 or newer, for other Linux machines; installs zig into the target folder
+    /// Link with glibc 2.28, for other Linux machines; installs zig into the target folder
     #[arg(long)]
     portable: bool,
 }
@@ -63,13 +63,11 @@ pub(crate) struct WheelArgs {
 /// portable, symbols of a newer glibc.
 pub(crate) fn run(repo: &Repo, args: &WheelArgs) -> XtaskResult {
     let profile = if args.portable { BuildProfile::Portable } else { BuildProfile::Release };
-    let wheel = build(repo, profile)?;
-    check(repo, &wheel, profile)?;
-    println!("{}", wheel.display());
-    // Zig does not find the library of MuJoCo by its versioned name, so this wheel needs the glibc of this machine.
-    let wheel = python_simulation::build(repo, BuildProfile::Release)?;
-    check(repo, &wheel, BuildProfile::Release)?;
-    println!("{}", wheel.display());
+    for build in [build, python_simulation::build] {
+        let wheel = build(repo, profile)?;
+        check(repo, &wheel, profile)?;
+        println!("{}", wheel.display());
+    }
     if args.sdist {
         let maturin = maturin(repo)?;
         let package = repo.root.join(PACKAGE);

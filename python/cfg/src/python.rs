@@ -239,9 +239,10 @@ impl Context {
                         let _ = write!(doc, "\n\n{}: {}", field.name, field.doc);
                     }
                     let content: Vec<String> = fields.iter().map(|field| format!("\"{0}\": {0}", field.name)).collect();
+                    let keywords = if fields.is_empty() { "" } else { "*, " };
                     let _ = write!(
                         text,
-                        "\n    @staticmethod\n    def {id}(*, {}) -> dict[str, Any]:\n{}        return {{\"{id}\": {{{}}}}}\n",
+                        "\n    @staticmethod\n    def {id}({keywords}{}) -> dict[str, Any]:\n{}        return {{\"{id}\": {{{}}}}}\n",
                         arguments.join(", "),
                         docstring(&doc, 8),
                         content.join(", ")
@@ -311,7 +312,11 @@ impl Context {
                     .iter()
                     .map(|item| element.map_or_else(|| literal(item), |class| self.instance(class, item)))
                     .collect();
-                format!("field(default_factory=lambda: [{}])", items.join(", "))
+                if element.is_none() || items.iter().map(String::len).sum::<usize>() < WIDTH {
+                    return format!("field(default_factory=lambda: [{}])", items.join(", "));
+                }
+                let items: String = items.iter().map(|item| format!("            {item},\n")).collect();
+                format!("field(\n        default_factory=lambda: [\n{items}        ]\n    )")
             }
             Value::Table(table) if table.is_empty() => "field(default_factory=dict)".into(),
             Value::Table(_) => format!("field(default_factory=lambda: {})", literal(value)),
@@ -333,7 +338,10 @@ impl Context {
     }
 
     fn class_of(&self, ty: &Type) -> Option<&'static str> {
-        self.classes.get(ident(ty).as_str()).copied()
+        let name = ident(ty);
+        let of_rust = self.classes.get(name.as_str()).copied();
+        // Enumerations that macros declare name the classes of Python.
+        of_rust.or_else(|| self.classes.values().copied().find(|class| *class == name))
     }
 
     /// Type annotation of a field.

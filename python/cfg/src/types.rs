@@ -138,6 +138,16 @@ pub(crate) fn structs() -> Vec<Struct> {
         "scene/src/terrain/gap.rs" GapTerrain = new::<scene::terrain::Gap>(), Gap;
         "scene/src/terrain/waves.rs" WavesTerrain = new::<scene::terrain::Waves>(), Waves;
         "scene/src/terrain/obstacles.rs" DiscreteObstaclesTerrain = new::<scene::terrain::DiscreteObstacles>(), DiscreteObstacles;
+        "scene/src/terrain/tile.rs" RoughTile = new::<scene::terrain::RoughTile>(), RoughTile;
+        "scene/src/terrain/tile.rs" SlopeTile = new::<scene::terrain::SlopeTile>(), SlopeTile;
+        "scene/src/terrain/tile.rs" StairsTile = new::<scene::terrain::StairsTile>(), StairsTile;
+        "scene/src/terrain/tile.rs" BoxesTile = new::<scene::terrain::BoxesTile>(), BoxesTile;
+        "scene/src/terrain/tile.rs" SteppingStonesTile = new::<scene::terrain::SteppingStonesTile>(), SteppingStonesTile;
+        "scene/src/terrain/tile.rs" GapTile = new::<scene::terrain::GapTile>(), GapTile;
+        "scene/src/terrain/tile.rs" WavesTile = new::<scene::terrain::WavesTile>(), WavesTile;
+        "scene/src/terrain/tile.rs" ObstaclesTile = new::<scene::terrain::ObstaclesTile>(), ObstaclesTile;
+        "scene/src/terrain/grid.rs" TileShare = scene::terrain::TileShare::from(scene::terrain::TerrainTile::Flat {}), TileShare;
+        "scene/src/terrain/grid.rs" TerrainGrid = new::<scene::terrain::TerrainGrid>(), TerrainGrid;
         "sim/src/objects/terrain.rs" TerrainCfg = new::<sim::TerrainCfg>(), TerrainCfg, "terrain";
         "sim/src/objects/mjcf_part_data.rs" MjcfPartCfg = new::<sim::MjcfPartCfg>(), MjcfPartCfg, "mjcf";
         "sim/src/objects/weld_data.rs" WeldCfg = new::<sim::WeldCfg>(), WeldCfg, "weld";
@@ -172,6 +182,8 @@ pub(crate) fn structs() -> Vec<Struct> {
         "sim/src/randomization/terms.rs" RandomizationTerm = example_term(), RandomizationTerm;
         "sim/src/randomization/terms.rs" Randomization = new::<sim::Randomization>(), Randomization;
     };
+    // The tile of a share is required.
+    all.iter_mut().filter(|known| known.class == "TileShare").for_each(|share| drop(share.default.remove("tile")));
     if let Some(simulation) = all.iter_mut().find(|known| known.class == "SimulationManagerCfg") {
         simulation.presets = vec![
             ("manipulation", table(&sim::SimulationManagerCfg::manipulation())),
@@ -195,6 +207,7 @@ pub(crate) const ENUMS: &[Enum] = &[
     Enum { file: "sim/src/objects/rigid_object_data.rs", name: "BodyType" },
     Enum { file: "sim/src/objects/mesh_collision.rs", name: "MeshCollision" },
     Enum { file: "sim/src/objects/shape.rs", name: "ObjectShape" },
+    Enum { file: "scene/src/terrain/tile.rs", name: "TerrainTile" },
     Enum { file: "robot/src/urdf/config.rs", name: "Strictness" },
     Enum { file: "robot/src/urdf/config.rs", name: "MissingInertia" },
     Enum { file: "robot/src/urdf/config.rs", name: "NameCase" },
@@ -236,6 +249,7 @@ pub(crate) const DECLARED_ENUMS: &[DeclaredEnum] = &[
             ("gap", Some("GapTerrain")),
             ("waves", Some("WavesTerrain")),
             ("discrete_obstacles", Some("DiscreteObstaclesTerrain")),
+            ("grid", Some("TerrainGrid")),
         ],
     },
     DeclaredEnum {

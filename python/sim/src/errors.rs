@@ -102,9 +102,10 @@ impl From<Failure> for PyErr {
     }
 }
 
-impl From<Error> for Failure {
-    fn from(error: Error) -> Self {
-        let class = match &error {
+impl Class {
+    /// Class of an error of a simulation.
+    pub(crate) fn of(error: &Error) -> Self {
+        match error {
             Error::Config { .. }
             | Error::SceneFile { .. }
             | Error::Exclusion { .. }
@@ -119,7 +120,7 @@ impl From<Error> for Failure {
             | Error::InvalidUid(_)
             | Error::Integrator { .. }
             | Error::UnsupportedIntegrator { .. }
-            | Error::Shard(_) => Class::Config,
+            | Error::Shard(_) => Self::Config,
             Error::Urdf(_)
             | Error::CollisionMesh { .. }
             | Error::ObjectMesh { .. }
@@ -127,9 +128,9 @@ impl From<Error> for Failure {
             | Error::MjcfFile { .. }
             | Error::RobotFile { .. }
             | Error::MjcfAttach { .. }
-            | Error::MjcfWrite(_) => Class::Model,
-            Error::UnknownName { .. } | Error::RobotNames { .. } | Error::MjcfNames { .. } => Class::UnknownName,
-            Error::UnknownIndex { .. } => Class::OutOfRange,
+            | Error::MjcfWrite(_) => Self::Model,
+            Error::UnknownName { .. } | Error::RobotNames { .. } | Error::MjcfNames { .. } => Self::UnknownName,
+            Error::UnknownIndex { .. } => Self::OutOfRange,
             Error::Shape { .. }
             | Error::NotFinite { .. }
             | Error::OutOfRange { .. }
@@ -137,12 +138,18 @@ impl From<Error> for Failure {
             | Error::RepeatedItem { .. }
             | Error::Randomization(_)
             | Error::Kinematics { .. }
-            | Error::EntityType { .. } => Class::Argument,
-            Error::Sensor { .. } | Error::SensorFault { .. } | Error::SensorRequires { .. } => Class::Sensor,
-            Error::Snapshot(_) => Class::Snapshot,
-            Error::File { .. } => Class::File,
-            _ => Class::Other,
-        };
+            | Error::EntityType { .. } => Self::Argument,
+            Error::Sensor { .. } | Error::SensorFault { .. } | Error::SensorRequires { .. } => Self::Sensor,
+            Error::Snapshot(_) => Self::Snapshot,
+            Error::File { .. } => Self::File,
+            _ => Self::Other,
+        }
+    }
+}
+
+impl From<Error> for Failure {
+    fn from(error: Error) -> Self {
+        let class = Class::of(&error);
         // A configuration from Python has no lines.
         if let Error::SceneFile { at, reason } = &error
             && at.file.as_path() == std::path::Path::new(crate::cfg::PYTHON)

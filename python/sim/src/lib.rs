@@ -75,6 +75,7 @@ fn _default_fields(name: &str) -> PyResult<String> {
     let text = shared::guarded(|| match name {
         "IkCfg" => Ok(toml::to_string(&IkCfg::default())?),
         "NullSpacePosture" => Ok(toml::to_string(&NullSpacePosture::at(Vec::new()))?),
+        "TerrainGrid" => Ok(toml::to_string(&kinetoscope::scene::terrain::TerrainGrid::default())?),
         "Randomization" => Ok(toml::to_string(&kinetoscope::sim::Randomization::default())?),
         other => Err(Failure::new(errors::Class::UnknownName, format!("no default of {other:?}"))),
     });

@@ -1,6 +1,7 @@
 //! The ready-made terms by name: the default [`TermRegistry`].
 
 use super::*;
+use crate::command::CommandTerm;
 use crate::error::Result as EnvResult;
 use crate::registry::{TermArgs, TermRegistry};
 use kinetoscope_scene::terrain::TerrainGrid;
@@ -25,6 +26,7 @@ params! {
     OfJoints { robot: Option<String>, joints: Vec<String> = "every_joint" }
     Efforts { robot: Option<String>, joints: Vec<String> = "every_joint", bound: f64 }
     Steps { robot: Option<String>, joints: Vec<String> = "every_joint", step: f64 }
+    Numbers { columns: toml::Table, resampling_time: Option<[f64; 2]> }
     OfCommand { command: String }
     Tracking { robot: Option<String>, command: String, std: f64 }
     Angle { robot: Option<String>, angle: f64 }
@@ -113,6 +115,16 @@ fn actions_and_commands(all: &mut TermRegistry) {
     all.add_action("relative_joint_positions", |args| {
         let Steps { robot, joints, step } = args.params()?;
         relative_joint_positions(args.sim(), args.name(), args.robot(robot.as_deref())?, &patterns(&joints), step)
+    });
+    all.add_command("uniform_command", |args| {
+        let Numbers { columns, resampling_time } = args.params()?;
+        let range = |(column, range): (String, toml::Value)| match range.try_into::<[f64; 2]>() {
+            Ok(range) => Ok((column, range)),
+            Err(error) => Err(args.error(format!("columns.{column}: {}", error.message()))),
+        };
+        let columns = columns.into_iter().map(range).collect::<EnvResult<Vec<(String, [f64; 2])>>>()?;
+        let term = uniform_command(args.name(), columns)?;
+        Ok(resampling_time.into_iter().fold(term, CommandTerm::resampled_every))
     });
     all.add_command("uniform_velocity", |args| {
         let of: Velocity = args.params()?;
@@ -207,7 +219,7 @@ fn events_and_curricula(all: &mut TermRegistry) {
     all.add_event("reset_root_uniform", |args| {
         let Root { robot, position, rpy, linear, angular } = args.params()?;
         let ranges = RootRanges { position, rpy, linear, angular };
-        Ok(reset_root_uniform(args.name(), args.robot(robot.as_deref())?, ranges))
+        reset_root_uniform(args.name(), args.robot(robot.as_deref())?, ranges)
     });
     all.add_event("reset_root_on_terrain", |args| {
         let OnTerrain { robot, grid, curriculum, position, rpy, linear, angular } = args.params()?;

@@ -1,8 +1,8 @@
 //! Random initial joint states.
 
-use super::find_joints;
+use super::{check_range, find_joints};
 use crate::episode_rng::env_ids;
-use crate::error::Result;
+use crate::error::{Result, TermKind};
 use crate::event::EventTerm;
 use kinetoscope_sim::{RobotId, SimulationManager};
 use ndarray::Array2;
@@ -13,7 +13,8 @@ use ndarray::Array2;
 /// distributed, with a number for each joint. Position targets stay at their defaults.
 ///
 /// # Errors
-/// A pattern is invalid or matches no joint, or two patterns match the same joint.
+/// A pattern is invalid or matches no joint, two patterns match the same joint, or the ends of a range are not finite or
+/// not in order.
 ///
 /// # Panics
 /// The robot belongs to another manager.
@@ -25,6 +26,9 @@ pub fn reset_joints_by_offset(
     positions: [f64; 2],
     velocities: [f64; 2],
 ) -> Result<EventTerm> {
+    for (field, range) in [("positions", positions), ("velocities", velocities)] {
+        check_range(TermKind::Event, name, field, range)?;
+    }
     let (_, joints) = find_joints(sim, robot, patterns)?;
     Ok(EventTerm::on_reset(name, move |sim, rngs| {
         let starts = sim.robot(robot).default_qpos();

@@ -1,7 +1,8 @@
 //! Random initial root states.
 
+use super::check_range;
 use crate::episode_rng::{EpisodeRng, env_ids};
-use crate::error::TermResult;
+use crate::error::{Result, TermKind, TermResult};
 use crate::event::EventTerm;
 use kinetoscope_scene::pose::{from_row, from_xyz_rpy, to_row};
 use kinetoscope_sim::{RobotId, SimulationManager};
@@ -21,10 +22,26 @@ pub struct RootRanges {
     pub angular: [[f64; 2]; 3],
 }
 
+impl RootRanges {
+    /// Checks the ranges of the event called `name`.
+    pub(super) fn check(&self, name: &str) -> Result<()> {
+        for (field, ranges) in
+            [("position", self.position), ("rpy", self.rpy), ("linear", self.linear), ("angular", self.angular)]
+        {
+            ranges.into_iter().try_for_each(|range| check_range(TermKind::Event, name, field, range))?;
+        }
+        Ok(())
+    }
+}
+
 /// Creates an event that sets the root link to a random pose and velocity when an episode begins. Poses are offsets
 /// from the default root pose. With a fixed base, the event returns an error.
-pub fn reset_root_uniform(name: &str, robot: RobotId, ranges: RootRanges) -> EventTerm {
-    EventTerm::on_reset(name, move |sim, rngs| write_roots(sim, robot, ranges, rngs, |_| [0.0; 3]))
+///
+/// # Errors
+/// The ends of a range are not finite or not in order.
+pub fn reset_root_uniform(name: &str, robot: RobotId, ranges: RootRanges) -> Result<EventTerm> {
+    ranges.check(name)?;
+    Ok(EventTerm::on_reset(name, move |sim, rngs| write_roots(sim, robot, ranges, rngs, |_| [0.0; 3])))
 }
 
 /// Sets the root links in the environments of `rngs` to random poses and velocities. The result of `origin` is added to

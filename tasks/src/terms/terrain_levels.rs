@@ -102,7 +102,8 @@ fn column(grid: &TerrainGrid, global_env: usize) -> usize {
 /// [`init_pose`]: kinetoscope_sim::TerrainCfg::init_pose
 ///
 /// # Errors
-/// [`kinetoscope_sim::Error::Terrain`] for a grid that has no heights.
+/// [`kinetoscope_sim::Error::Terrain`] for a grid that has no heights, and [`EnvError::Config`] for a range whose ends are
+/// not finite or not in order.
 pub fn reset_root_on_terrain(
     name: &str,
     robot: RobotId,
@@ -110,6 +111,7 @@ pub fn reset_root_on_terrain(
     curriculum: impl Into<String>,
     ranges: RootRanges,
 ) -> Result<EventTerm> {
+    ranges.check(name)?;
     let origins = grid.platform_heights().map_err(kinetoscope_sim::Error::from)?;
     let (grid, curriculum) = (grid.clone(), curriculum.into());
     Ok(EventTerm::with_context(name, EventMode::Reset, move |now, rngs| {

@@ -1,7 +1,8 @@
 //! Velocity commands of walking robots.
 
+use super::check_range;
 use crate::command::CommandTerm;
-use crate::error::{EnvError, Result};
+use crate::error::{EnvError, Result, TermKind};
 use kinetoscope_sim::RobotId;
 use ndarray::Array2;
 use std::f64::consts::{PI, TAU};
@@ -57,10 +58,7 @@ impl UniformVelocityCfg {
             ("heading", self.heading),
         ];
         for (field, range) in ranges {
-            if let Some([low, high]) = range.filter(|[low, high]| !(low.is_finite() && high.is_finite() && low <= high))
-            {
-                return wrong(field, format!("{low} to {high}"), "both numbers must be finite, in order");
-            }
+            check_range(TermKind::Command, name, field, range.unwrap_or_default())?;
         }
         for (field, share) in
             [("rel_heading_envs", self.rel_heading_envs), ("rel_standing_envs", self.rel_standing_envs)]

@@ -3,8 +3,8 @@
 use super::bundled::{cfg, idle, world};
 use kinetoscope::ndarray::{Array2, array};
 use kinetoscope::prelude::*;
-use kinetoscope::tasks::terms::{UniformVelocityCfg, generated_commands, uniform_velocity};
-use kinetoscope::tasks::{CommandTerm, Env, EnvBuilder, EnvCfg, EnvError};
+use kinetoscope::tasks::terms::{UniformVelocityCfg, generated_commands, uniform_command, uniform_velocity};
+use kinetoscope::tasks::{CommandTerm, Env, EnvBuilder, EnvCfg, EnvError, TaskCfg, TermRegistry};
 use kinetoscope_testkit::worlds::{mjcf_robot, passive};
 use std::f64::consts::PI;
 
@@ -179,4 +179,47 @@ fn refused() {
         let error = env.reset(None, None).unwrap_err().to_string();
         assert!(error.contains("goal") && error.contains(word), "{error}");
     }
+}
+
+/// Columns are independent, in the order of the file, and within their ranges.
+#[test]
+fn uniform_commands() {
+    const N: usize = 400;
+    let text = "
+        [actions.push]
+        type = \"joint_efforts\"
+        bound = 1
+        [commands.goal]
+        type = \"uniform_command\"
+        columns = { x = [2, 4], a = [-1, 0], same = [7, 7] }
+        [observations.policy.goal]
+        type = \"generated_commands\"
+        command = \"goal\"
+    ";
+    let task = |text: &str| {
+        let (sim, task) = (world(cfg(N, 1), false).0, TaskCfg::from_toml(text).unwrap());
+        EnvBuilder::from_cfg(sim, &task, &TermRegistry::default()).unwrap().build().unwrap()
+    };
+    let mut env = task(text);
+    assert_eq!(env.observation_space().names(), ["goal/x", "goal/a", "goal/same"]);
+    let drawn = env.reset(None, Some(3)).unwrap();
+    for (column, [low, high]) in [(0, [2.0, 4.0]), (1, [-1.0, 0.0])] {
+        let values = drawn.column(column);
+        assert!(values.iter().all(|value| (low..=high).contains(value)));
+        // The mean of N numbers is within five standard deviations of a uniform distribution, width / sqrt(12 N).
+        let deviation = (high - low) / (12.0 * N as f64).sqrt();
+        assert!((values.sum() / N as f64 - 0.5 * (low + high)).abs() < 5.0 * deviation);
+    }
+    assert!(drawn.column(2).iter().all(|value| *value == 7.0));
+    // The correlation of N independent pairs has the standard deviation 1 / sqrt(N).
+    let product = |row: kinetoscope::ndarray::ArrayView1<'_, f64>| (row[0] - 3.0) * (row[1] + 0.5) * 6.0;
+    let correlation = drawn.rows().into_iter().map(product).sum::<f64>() / N as f64;
+    assert!(correlation.abs() < 5.0 / (N as f64).sqrt(), "{correlation}");
+    // They stay during an episode, unless there is a time.
+    let idle = Array2::zeros((N, 1));
+    assert_eq!(env.step(&idle).unwrap().observations, drawn);
+    let mut resampled = task(&text.replace("columns =", "resampling_time = [0.01, 0.01]\ncolumns ="));
+    assert_eq!(resampled.reset(None, Some(3)).unwrap(), drawn);
+    assert_ne!(resampled.step(&idle).unwrap().observations, drawn);
+    assert!(matches!(uniform_command("goal", [("x", [1.0, 0.0])]), Err(EnvError::Config { .. })));
 }

@@ -94,6 +94,11 @@ fn same_bits() {
     assert!(run(of_text(&TASK.replace("scale = 2", "scale = 2.001")).unwrap()) != run(of_functions()));
 }
 
+/// A command with columns, before the rewards.
+fn command(columns: &str) -> String {
+    format!("[commands.goal]\ntype = \"uniform_command\"\n[commands.goal.columns]\n{columns}\n[rewards.alive]")
+}
+
 /// Each row replaces a part of the text and names the words of the error.
 #[test]
 fn mistakes() {
@@ -133,6 +138,27 @@ fn mistakes() {
             &["observations.policy.action", "sensor", "eye"],
         ),
         ("positions = [-0.1, 0.1]", "positions = [-0.1]", &["events.start"]),
+        // Numbers are drawn from reversed ranges as from ranges in order, which hides the mistake.
+        ("positions = [-0.1, 0.1]", "positions = [0.1, -0.1]", &["events.start", "positions", "0.1 to -0.1"]),
+        (
+            "positions = [-0.1, 0.1]",
+            "positions = [0, 0]\nvelocities = [0, nan]",
+            &["events.start", "velocities", "finite"],
+        ),
+        (
+            "type = \"reset_joints_by_offset\"\npositions = [-0.1, 0.1]",
+            "type = \"reset_root_uniform\"\nrpy = [[0, 0], [0, 0], [1, -1]]",
+            &["events.start", "rpy", "1 to -1"],
+        ),
+        (
+            "[rewards.alive]",
+            "[observations.angles]\ntype = \"joint_pos_rel\"\n[rewards.alive]",
+            &["observations.policy.angles"],
+        ),
+        ("[rewards.alive]", &*command("x = [2, 1]"), &["commands.goal", "x of the command term", "2 to 1"]),
+        ("[rewards.alive]", &*command("x = 2"), &["commands.goal", "columns.x"]),
+        ("[rewards.alive]", &*command(""), &["commands.goal", "at least one column"]),
+        ("[rewards.alive]", &*command("x = [1, 2]\ny = [1, 2, 3]"), &["commands.goal", "columns.y"]),
     ] {
         assert!(TASK.contains(from), "{from}");
         let error = of_text(&TASK.replacen(from, to, 1)).map(drop).expect_err(to).to_string();

@@ -139,7 +139,7 @@ fn root_ranges() {
         angular: [[0.0; 2], [0.0; 2], [2.0, 3.0]],
     };
     let (sim, robot) = floater(N, false);
-    let [poses, speeds, ..] = initial_state(terms::reset_root_uniform("start", robot, ranges), robot, sim);
+    let [poses, speeds, ..] = initial_state(terms::reset_root_uniform("start", robot, ranges).unwrap(), robot, sim);
     let yaw = poses.rows().into_iter().map(|row| 2.0 * row[6].atan2(row[3])).collect::<Vec<f64>>();
     let column = |table: &Array2<f64>, k: usize| table.column(k).to_vec();
     for (name, values, [low, high]) in [
@@ -169,7 +169,7 @@ fn root_ranges() {
     let lying = Pose::rotation([FRAC_PI_2, 0.0, 0.0].into());
     let robot = RobotCfg { fix_base: false, init_pose: lying, ..passive(mjcf_robot("floater", FLOATER)) };
     let robot = sim.add_robot(robot).unwrap();
-    let [poses, ..] = initial_state(terms::reset_root_uniform("start", robot, ranges), robot, sim);
+    let [poses, ..] = initial_state(terms::reset_root_uniform("start", robot, ranges).unwrap(), robot, sim);
     let turned = |row: ArrayView1<'_, f64>| from_row(&std::array::from_fn(|k| row[k])).rotation;
     let axes: Vec<_> = poses.rows().into_iter().map(|row| turned(row) * Vector3::z()).collect();
     assert!(axes.iter().all(|z| (z + Vector3::y()).norm() < 1e-12), "{axes:?}");

@@ -28,6 +28,69 @@ resets.
 """
 
 
+class TerrainTile:
+    """A type of tile. Pairs of numbers are [easiest, hardest]; a difficulty from 0 to 1 interpolates between them.
+
+    In a file, it is a table with the name of the type: ``{ stairs_up = { step_height = [0.05, 0.2] } }``, ``{ flat = {}
+    }``.
+    """
+
+    @staticmethod
+    def flat() -> dict[str, Any]:
+        """Flat ground."""
+        return {"flat": {}}
+
+    @staticmethod
+    def rough(value: RoughTile | Mapping[str, Any]) -> dict[str, Any]:
+        """Random heights (``RoughTerrain``)."""
+        return {"rough": value}
+
+    @staticmethod
+    def slope_up(value: SlopeTile | Mapping[str, Any]) -> dict[str, Any]:
+        """Slopes up to a platform (``PyramidSlopeTerrain``)."""
+        return {"slope_up": value}
+
+    @staticmethod
+    def slope_down(value: SlopeTile | Mapping[str, Any]) -> dict[str, Any]:
+        """Slopes down to a platform (``PyramidSlopeTerrain``)."""
+        return {"slope_down": value}
+
+    @staticmethod
+    def stairs_up(value: StairsTile | Mapping[str, Any]) -> dict[str, Any]:
+        """Stairs up to a platform (``PyramidStairsTerrain``)."""
+        return {"stairs_up": value}
+
+    @staticmethod
+    def stairs_down(value: StairsTile | Mapping[str, Any]) -> dict[str, Any]:
+        """Stairs down to a platform (``PyramidStairsTerrain``)."""
+        return {"stairs_down": value}
+
+    @staticmethod
+    def boxes(value: BoxesTile | Mapping[str, Any]) -> dict[str, Any]:
+        """Boxes with random heights (``BoxesTerrain``)."""
+        return {"boxes": value}
+
+    @staticmethod
+    def stepping_stones(value: SteppingStonesTile | Mapping[str, Any]) -> dict[str, Any]:
+        """Stones over a deep ground (``SteppingStonesTerrain``)."""
+        return {"stepping_stones": value}
+
+    @staticmethod
+    def gap(value: GapTile | Mapping[str, Any]) -> dict[str, Any]:
+        """A trench around a platform (``GapTerrain``)."""
+        return {"gap": value}
+
+    @staticmethod
+    def waves(value: WavesTile | Mapping[str, Any]) -> dict[str, Any]:
+        """Waves (``WavesTerrain``)."""
+        return {"waves": value}
+
+    @staticmethod
+    def discrete_obstacles(value: ObstaclesTile | Mapping[str, Any]) -> dict[str, Any]:
+        """Separate obstacles (``DiscreteObstaclesTerrain``)."""
+        return {"discrete_obstacles": value}
+
+
 class TerrainGenerator:
     """Generator of the heights of a terrain, which also defines its size."""
 
@@ -36,40 +99,44 @@ class TerrainGenerator:
         return {"rough": value}
 
     @staticmethod
-    def slope(value: str | Mapping[str, Any]) -> dict[str, Any]:
+    def slope(value: SlopeTerrain | Mapping[str, Any]) -> dict[str, Any]:
         return {"slope": value}
 
     @staticmethod
-    def pyramid_stairs(value: str | Mapping[str, Any]) -> dict[str, Any]:
+    def pyramid_stairs(value: PyramidStairsTerrain | Mapping[str, Any]) -> dict[str, Any]:
         return {"pyramid_stairs": value}
 
     @staticmethod
-    def flat(value: str | Mapping[str, Any]) -> dict[str, Any]:
+    def flat(value: FlatTerrain | Mapping[str, Any]) -> dict[str, Any]:
         return {"flat": value}
 
     @staticmethod
-    def pyramid_slope(value: str | Mapping[str, Any]) -> dict[str, Any]:
+    def pyramid_slope(value: PyramidSlopeTerrain | Mapping[str, Any]) -> dict[str, Any]:
         return {"pyramid_slope": value}
 
     @staticmethod
-    def boxes(value: str | Mapping[str, Any]) -> dict[str, Any]:
+    def boxes(value: BoxesTerrain | Mapping[str, Any]) -> dict[str, Any]:
         return {"boxes": value}
 
     @staticmethod
-    def stepping_stones(value: str | Mapping[str, Any]) -> dict[str, Any]:
+    def stepping_stones(value: SteppingStonesTerrain | Mapping[str, Any]) -> dict[str, Any]:
         return {"stepping_stones": value}
 
     @staticmethod
-    def gap(value: str | Mapping[str, Any]) -> dict[str, Any]:
+    def gap(value: GapTerrain | Mapping[str, Any]) -> dict[str, Any]:
         return {"gap": value}
 
     @staticmethod
-    def waves(value: str | Mapping[str, Any]) -> dict[str, Any]:
+    def waves(value: WavesTerrain | Mapping[str, Any]) -> dict[str, Any]:
         return {"waves": value}
 
     @staticmethod
-    def discrete_obstacles(value: str | Mapping[str, Any]) -> dict[str, Any]:
+    def discrete_obstacles(value: DiscreteObstaclesTerrain | Mapping[str, Any]) -> dict[str, Any]:
         return {"discrete_obstacles": value}
+
+    @staticmethod
+    def grid(value: TerrainGrid | Mapping[str, Any]) -> dict[str, Any]:
+        return {"grid": value}
 
 
 @dataclass(kw_only=True, slots=True)
@@ -388,6 +455,158 @@ class DiscreteObstaclesTerrain:
 
     seed: int = 0
     """Seed. Equal seeds give the same heights, bit for bit, on every machine."""
+
+
+@dataclass(kw_only=True, slots=True)
+class RoughTile:
+    """Numbers of a rough tile. Pairs are [easiest, hardest]."""
+
+    amplitude: Sequence[float] = (0.02, 0.1)
+    """Largest height above and below 0 [m]."""
+
+    step: float = 0.01
+    """Step between heights, which are its multiples [m]."""
+
+
+@dataclass(kw_only=True, slots=True)
+class SlopeTile:
+    """Numbers of a tile of slopes. Pairs are [easiest, hardest]."""
+
+    gradient: Sequence[float] = (0.0, 0.4)
+    """Rise per meter: the tangent of the angle."""
+
+
+@dataclass(kw_only=True, slots=True)
+class StairsTile:
+    """Numbers of a tile of stairs. Pairs are [easiest, hardest]."""
+
+    step_height: Sequence[float] = (0.05, 0.23)
+    """Height of a step [m]."""
+
+    tread: float = 0.3
+    """Depth of a tread, including its riser [m]."""
+
+
+@dataclass(kw_only=True, slots=True)
+class BoxesTile:
+    """Numbers of a tile of boxes. Pairs are [easiest, hardest]."""
+
+    height: Sequence[float] = (0.05, 0.2)
+    """Largest height above and below 0 [m]."""
+
+    side: float = 0.45
+    """Side of a box [m]."""
+
+
+@dataclass(kw_only=True, slots=True)
+class SteppingStonesTile:
+    """Numbers of a tile of stepping stones. Pairs are [easiest, hardest]."""
+
+    stone: Sequence[float] = (0.8, 0.3)
+    """Side of a stone [m]."""
+
+    distance: Sequence[float] = (0.2, 0.4)
+    """Gap between two stones [m]."""
+
+    depth: float = 1.0
+    """Depth of the ground between the stones [m]."""
+
+
+@dataclass(kw_only=True, slots=True)
+class GapTile:
+    """Numbers of a tile with a trench. Pairs are [easiest, hardest]."""
+
+    width: Sequence[float] = (0.2, 0.8)
+    """Width of the trench [m]."""
+
+    depth: float = 1.0
+    """Depth of the trench [m]."""
+
+
+@dataclass(kw_only=True, slots=True)
+class WavesTile:
+    """Numbers of a tile of waves. Pairs are [easiest, hardest]."""
+
+    amplitude: Sequence[float] = (0.02, 0.2)
+    """Largest height above and below 0 [m]."""
+
+    waves: float = 4.0
+    """Number of waves along each side."""
+
+
+@dataclass(kw_only=True, slots=True)
+class ObstaclesTile:
+    """Numbers of a tile of obstacles. The height is [easiest, hardest]."""
+
+    height: Sequence[float] = (0.05, 0.2)
+    """Height of the obstacles [m]."""
+
+    sides: Sequence[float] = (0.3, 1.0)
+    """Shortest and longest side of an obstacle [m]."""
+
+    count: int = 40
+    """Number of obstacles."""
+
+
+@dataclass(kw_only=True, slots=True)
+class TileShare:
+    """A type of tile, and its share of the columns of a grid."""
+
+    tile: str | Mapping[str, Any]
+    """The type."""
+
+    share: float = 1.0
+    """Share of the columns, relative to the other shares; 1 in files without this number."""
+
+
+@dataclass(kw_only=True, slots=True)
+class TerrainGrid:
+    """A grid of terrain tiles: a type for each column, a difficulty for each row, for curricula of walking robots.
+
+    Rows are along x and columns along y, both from the negative ends. Row 0 is the easiest one. All tiles meet at
+    height 0: the points between two tiles, and those of a flat border around the grid, have this height.
+    """
+
+    tile_size: Sequence[float] = (8.0, 8.0)
+    """Lengths of a tile along x and y [m]."""
+
+    cell: float = 0.1
+    """Distance of neighboring points [m]."""
+
+    rows: int = 10
+    """Number of rows, each with a difficulty."""
+
+    columns: int = 11
+    """Number of columns, each with a type of tile."""
+
+    tiles: Sequence[TileShare | Mapping[str, Any]] = field(
+        default_factory=lambda: [
+            TileShare(tile={"flat": {}}),
+            TileShare(tile={"rough": {"amplitude": (0.02, 0.1), "step": 0.01}}),
+            TileShare(tile={"slope_up": {"gradient": (0.0, 0.4)}}),
+            TileShare(tile={"slope_down": {"gradient": (0.0, 0.4)}}),
+            TileShare(tile={"stairs_up": {"step_height": (0.05, 0.23), "tread": 0.3}}),
+            TileShare(tile={"stairs_down": {"step_height": (0.05, 0.23), "tread": 0.3}}),
+            TileShare(tile={"boxes": {"height": (0.05, 0.2), "side": 0.45}}),
+            TileShare(tile={"stepping_stones": {"stone": (0.8, 0.3), "distance": (0.2, 0.4), "depth": 1.0}}),
+            TileShare(tile={"gap": {"width": (0.2, 0.8), "depth": 1.0}}),
+            TileShare(tile={"waves": {"amplitude": (0.02, 0.2), "waves": 4.0}}),
+            TileShare(tile={"discrete_obstacles": {"height": (0.05, 0.2), "sides": (0.3, 1.0), "count": 40}}),
+        ]
+    )
+    """Types of the tiles, with their shares of the columns."""
+
+    difficulty: Sequence[float] = (0.0, 1.0)
+    """Difficulties of the first and the last row, from 0 to 1; the rows between them have equal steps."""
+
+    platform: float = 2.0
+    """Side of the platform at the center of a tile [m], where robots start."""
+
+    border: float = 2.0
+    """Width of the flat border around the grid [m]; 0 for no border."""
+
+    seed: int = 0
+    """Seed of random heights. Equal seeds give the same heights, bit for bit, on every machine."""
 
 
 @dataclass(kw_only=True, slots=True)

@@ -65,23 +65,23 @@ class RayPattern:
     """Starts and directions of the rays of a ray caster."""
 
     @staticmethod
-    def grid(value: str | Mapping[str, Any]) -> dict[str, Any]:
+    def grid(value: GridPattern | Mapping[str, Any]) -> dict[str, Any]:
         return {"grid": value}
 
     @staticmethod
-    def lidar(value: str | Mapping[str, Any]) -> dict[str, Any]:
+    def lidar(value: LidarPattern | Mapping[str, Any]) -> dict[str, Any]:
         return {"lidar": value}
 
     @staticmethod
-    def bpearl(value: str | Mapping[str, Any]) -> dict[str, Any]:
+    def bpearl(value: BpearlPattern | Mapping[str, Any]) -> dict[str, Any]:
         return {"bpearl": value}
 
     @staticmethod
-    def pinhole(value: str | Mapping[str, Any]) -> dict[str, Any]:
+    def pinhole(value: PinholePattern | Mapping[str, Any]) -> dict[str, Any]:
         return {"pinhole": value}
 
     @staticmethod
-    def custom(value: str | Mapping[str, Any]) -> dict[str, Any]:
+    def custom(value: CustomPattern | Mapping[str, Any]) -> dict[str, Any]:
         return {"custom": value}
 
 

@@ -15,7 +15,7 @@ from ...errors import ConfigError
 from .._poses import to_matrix, to_world
 from .._tensors import array, tensor
 from ..configclass import configclass
-from .asset_base import AssetBaseCfg, ids_of
+from .asset_base import AssetBaseCfg, RootAsset, RootData, ids_of
 from .rigid_object import RigidObject, RigidObjectCfg
 
 __all__ = ["Articulation", "ArticulationCfg", "AssetBaseCfg", "RigidObject", "RigidObjectCfg"]
@@ -124,7 +124,7 @@ def articulation_fields(uid: str, cfg: ArticulationCfg) -> dict[str, Any]:
     }
 
 
-class ArticulationData:
+class ArticulationData(RootData):
     """State of an articulation as tensors."""
 
     def __init__(self, native: Robot, origins: Any, cfg: ArticulationCfg) -> None:
@@ -183,26 +183,6 @@ class ArticulationData:
         return tensor(to_world(states, self._origins))
 
     @property
-    def root_pos_w(self) -> Any:
-        return self.root_state_w[:, :3]
-
-    @property
-    def root_quat_w(self) -> Any:
-        return self.root_state_w[:, 3:7]
-
-    @property
-    def root_lin_vel_w(self) -> Any:
-        return self.root_state_w[:, 7:10]
-
-    @property
-    def root_ang_vel_w(self) -> Any:
-        return self.root_state_w[:, 10:13]
-
-    @property
-    def root_vel_w(self) -> Any:
-        return self.root_state_w[:, 7:13]
-
-    @property
     def root_lin_vel_b(self) -> Any:
         axes = to_matrix(self._native.root_pose)[:, :3, :3]
         return tensor(np.einsum("nij,ni->nj", axes, self._native.root_com_velocity[:, :3]))
@@ -224,28 +204,16 @@ class ArticulationData:
         states = np.concatenate([self._native.link_poses, self._native.link_velocities], axis=-1)
         return tensor(to_world(states, self._origins))
 
-    @property
-    def body_pos_w(self) -> Any:
-        return self.body_state_w[..., :3]
 
-    @property
-    def body_quat_w(self) -> Any:
-        return self.body_state_w[..., 3:7]
-
-
-class Articulation:
+class Articulation(RootAsset):
     """A robot. ``native`` is the object of this package. Targets take effect in ``write_data_to_sim``."""
 
     def __init__(self, native: Robot, origins: Any, cfg: ArticulationCfg) -> None:
+        super().__init__(origins)
         self.native = native
         self.cfg = cfg
         self.data = ArticulationData(native, origins, cfg)
-        self._origins = origins
         self._pending: dict[str, tuple[Any, Any, Any]] = {}
-
-    @property
-    def num_instances(self) -> int:
-        return len(self._origins)
 
     @property
     def num_joints(self) -> int:
@@ -272,24 +240,11 @@ class Articulation:
         found = self.native.find_links([name_keys] if isinstance(name_keys, str) else list(name_keys))
         return found, [self.native.link_names[index] for index in found]
 
-    def _local(self, states: Any, env_ids: Any) -> Any:
-        states = np.array(array(states), dtype=float)
-        chosen = ids_of(env_ids, self.num_instances)
-        states[:, :3] -= self._origins if chosen is None else self._origins[chosen]
-        return states
+    def _write_root_pose(self, poses: Any, env_ids: Any) -> None:
+        self.native.write_root_pose(poses, env_ids)
 
-    def write_root_state_to_sim(self, root_state: Any, env_ids: Any = None) -> None:
-        """Writes poses (world frame) and velocities of the root, shape (n, 13)."""
-        states = np.asarray(array(root_state), dtype=float)
-        self.write_root_pose_to_sim(states[:, :7], env_ids)
-        self.write_root_velocity_to_sim(states[:, 7:], env_ids)
-
-    def write_root_pose_to_sim(self, root_pose: Any, env_ids: Any = None) -> None:
-        self.native.write_root_pose(self._local(root_pose, env_ids), ids_of(env_ids, self.num_instances))
-
-    def write_root_velocity_to_sim(self, root_velocity: Any, env_ids: Any = None) -> None:
-        """Writes velocities of the center of mass of the root, world axes, shape (n, 6)."""
-        self.native.write_root_com_velocity(array(root_velocity), ids_of(env_ids, self.num_instances))
+    def _write_root_velocity(self, velocities: Any, env_ids: Any) -> None:
+        self.native.write_root_com_velocity(velocities, env_ids)
 
     def write_joint_state_to_sim(self, position: Any, velocity: Any, joint_ids: Any = None, env_ids: Any = None) -> None:
         self.native.write_joint_state(array(position), array(velocity), ids_of(joint_ids, self.num_joints), ids_of(env_ids, self.num_instances))
@@ -342,6 +297,3 @@ class Articulation:
             self.native.write_qvel(np.asarray(self.data.default_joint_vel, dtype=float))
         if any(start.lin_vel) or any(start.ang_vel):
             self.write_root_velocity_to_sim(np.asarray(self.data.default_root_state)[:, 7:])
-
-    def update(self, dt: float) -> None:
-        """Does nothing: data is read from the simulation."""

@@ -11,7 +11,7 @@ from ..._sim import RigidObject as NativeRigidObject
 from .._poses import to_world
 from .._tensors import array, tensor
 from ..configclass import configclass
-from .asset_base import AssetBaseCfg, ids_of
+from .asset_base import AssetBaseCfg, RootAsset, RootData, ids_of
 from .spawners import shape
 
 
@@ -40,7 +40,7 @@ def object_fields(uid: str, cfg: RigidObjectCfg) -> dict[str, Any]:
     return {"uid": uid, "init_pose": [float(x) for x in (*start.pos, *start.rot)], **shape(cfg.spawn, uid)}
 
 
-class RigidObjectData:
+class RigidObjectData(RootData):
     """State of a rigid object as tensors."""
 
     def __init__(self, native: NativeRigidObject, origins: Any, cfg: RigidObjectCfg) -> None:
@@ -56,50 +56,18 @@ class RigidObjectData:
         return tensor(to_world(states, self._origins))
 
     @property
-    def root_pos_w(self) -> Any:
-        return self.root_state_w[:, :3]
-
-    @property
-    def root_quat_w(self) -> Any:
-        return self.root_state_w[:, 3:7]
-
-    @property
-    def root_vel_w(self) -> Any:
-        return self.root_state_w[:, 7:13]
-
-    @property
-    def root_lin_vel_w(self) -> Any:
-        return self.root_state_w[:, 7:10]
-
-    @property
-    def root_ang_vel_w(self) -> Any:
-        return self.root_state_w[:, 10:13]
-
-    @property
     def body_state_w(self) -> Any:
         return self.root_state_w[:, None]
 
-    @property
-    def body_pos_w(self) -> Any:
-        return self.body_state_w[..., :3]
 
-    @property
-    def body_quat_w(self) -> Any:
-        return self.body_state_w[..., 3:7]
-
-
-class RigidObject:
+class RigidObject(RootAsset):
     """A rigid object. ``native`` is the object of this package."""
 
     def __init__(self, native: NativeRigidObject, origins: Any, cfg: RigidObjectCfg) -> None:
+        super().__init__(origins)
         self.native = native
         self.cfg = cfg
         self.data = RigidObjectData(native, origins, cfg)
-        self._origins = origins
-
-    @property
-    def num_instances(self) -> int:
-        return len(self._origins)
 
     @property
     def num_bodies(self) -> int:
@@ -118,20 +86,11 @@ class RigidObject:
                 raise ValueError(f"no body matches {pattern!r}; bodies: {self.body_names[0]}")
         return [0], self.body_names
 
-    def write_root_state_to_sim(self, root_state: Any, env_ids: Any = None) -> None:
-        """Writes poses (world frame) and velocities, shape (n, 13)."""
-        states = np.array(array(root_state), dtype=float)
-        self.write_root_pose_to_sim(states[:, :7], env_ids)
-        self.write_root_velocity_to_sim(states[:, 7:], env_ids)
+    def _write_root_pose(self, poses: Any, env_ids: Any) -> None:
+        self.native.write_pose(poses, env_ids)
 
-    def write_root_pose_to_sim(self, root_pose: Any, env_ids: Any = None) -> None:
-        poses = np.array(array(root_pose), dtype=float)
-        chosen = ids_of(env_ids, self.num_instances)
-        poses[:, :3] -= self._origins if chosen is None else self._origins[chosen]
-        self.native.write_pose(poses, chosen)
-
-    def write_root_velocity_to_sim(self, root_velocity: Any, env_ids: Any = None) -> None:
-        self.native.write_velocity(array(root_velocity), ids_of(env_ids, self.num_instances))
+    def _write_root_velocity(self, velocities: Any, env_ids: Any) -> None:
+        self.native.write_velocity(velocities, env_ids)
 
     def set_external_force_and_torque(self, forces: Any, torques: Any, body_ids: Any = None, env_ids: Any = None) -> None:
         """A force and a torque in the axes of the object, shape (n, 1, 3), until they are set again."""
@@ -155,6 +114,3 @@ class RigidObject:
         velocity = np.asarray(self.data.default_root_state)[:, 7:]
         if velocity.any():
             self.native.write_velocity(velocity)
-
-    def update(self, dt: float) -> None:
-        """Does nothing: data is read from the simulation."""
