@@ -13,7 +13,7 @@
 //! |---|---|
 //! | `recorder`, `cfg`, `topic`, `source`, `stream`, `overview`, `clock` | the observer: what is recorded, and when |
 //! | `packet`, `writer`, `file`, `folder` | packets, the writer thread, atomic files and folders |
-//! | `mcap_writer`, `ros`, `scene_update` | MCAP files of ROS 2 messages |
+//! | `ros_writer`, `mcap_writer`, `ros`, `scene_update` | ROS 2 messages, and MCAP files of them |
 //! | `npz`, `archive` | NumPy archives |
 //! | `image_folder`, `png`, `animation` | PNG files and animations |
 //! | `episodes`, `lerobot` | datasets of episodes for learning, behind the feature `lerobot` |
@@ -57,6 +57,7 @@ mod recorder;
 mod recover;
 pub mod replay;
 mod ros;
+mod ros_writer;
 mod scene_file;
 mod scene_update;
 mod source;
