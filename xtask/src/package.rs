@@ -40,7 +40,7 @@ pub(crate) fn docs_rs(repo: &Repo, ready: &Prepared) -> XtaskResult {
             "--package",
             "kinetoscope",
             "--features",
-            "download,lerobot,relocated-assets",
+            "download,foxglove,lerobot,relocated-assets",
         ])
         .run()
 }
