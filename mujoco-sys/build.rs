@@ -136,6 +136,8 @@ impl Installation {
             std::os::unix::fs::symlink(library, &link).expect("OUT_DIR is writable");
         }
         println!("cargo::rustc-link-search=native={}", out.display());
+        let folder = library.parent().expect("find_library returns a file in a folder");
+        println!("cargo::metadata=library_dir={}", folder.display());
         println!("cargo::rustc-link-lib=dylib={LINKED}");
     }
 }

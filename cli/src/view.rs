@@ -28,6 +28,10 @@ pub(crate) struct Args {
     /// machines can reach (0.0.0.0:8080) requires the printed token
     #[arg(long, value_name = "ADDR", num_args = 0..=1, default_missing_value = "127.0.0.1:8080")]
     serve: Option<String>,
+    /// Also stream all recorded topics to Foxglove, which connects to ws://127.0.0.1:8765 or to the given port; an address
+    /// before the port (0.0.0.0:8765) lets all machines read them. Build with --features foxglove
+    #[arg(long, value_name = "PORT", num_args = 0..=1, default_missing_value = "8765")]
+    foxglove: Option<String>,
     /// Number of environments, side by side [default: that of a scene file, else 1]
     #[arg(long, alias = "num_envs")]
     num_envs: Option<usize>,
@@ -62,6 +66,7 @@ Examples:
   kinetoscope view scene.toml                     a scene file
   kinetoscope view arm.urdf --serve               in a browser, at http://127.0.0.1:8080
   kinetoscope view arm.urdf --record run.mcap
+  kinetoscope view arm.urdf --foxglove            live in Foxglove, beside the window
 
 Exit codes: 0 ended normally; 1 ended normally, with warnings (something was repaired or ignored, an environment diverged);
 2 refused, or the display was lost.";
@@ -84,6 +89,9 @@ pub(crate) fn run(args: &Args) -> Result<CommandStatus> {
             .unwrap_or_else(PoisonError::into_inner)
             .start(&mut sim)
             .map_err(|error| format!("--record {error}"))?;
+    }
+    if let Some(address) = &args.foxglove {
+        stream_to_foxglove(&mut sim, address).map_err(|error| format!("--foxglove: {error}"))?;
     }
     let window = args.open_view(&mut sim, RecordButton::shared(Arc::clone(&files)))?;
     let closed = || window.as_ref().and_then(Window::closed);
@@ -132,6 +140,24 @@ impl Args {
         println!("A window shows {names}: H in it shows its keys; closing it, or Ctrl+C here, ends it.");
         Ok(Some(window))
     }
+}
+
+/// Streams the simulation to Foxglove.
+///
+/// # Errors
+/// The address is invalid or in use, or there is nothing to stream.
+#[cfg(feature = "foxglove")]
+fn stream_to_foxglove(sim: &mut SimulationManager, address: &str) -> Result<()> {
+    use kinetoscope::record::{FoxgloveCfg, StreamToFoxglove as _};
+    let server = sim.stream_to_foxglove(FoxgloveCfg::at(address)?)?;
+    println!("Open {} in Foxglove (Open connection, Foxglove WebSocket)", server.url());
+    Ok(())
+}
+
+/// Always fails: this build has no streams.
+#[cfg(not(feature = "foxglove"))]
+fn stream_to_foxglove(_: &mut SimulationManager, _: &str) -> Result<()> {
+    Err("this build does not stream to Foxglove: build with `--features foxglove`".into())
 }
 
 /// Returns the error message for a window that cannot be opened, with alternatives.

@@ -46,6 +46,10 @@ pub(crate) struct Launcher {
     /// 127.0.0.1:8080. An address that other machines can reach (0.0.0.0:8080) requires the printed token
     #[arg(long, value_name = "ADDR", num_args = 0..=1, default_missing_value = SERVE)]
     pub(crate) serve: Option<String>,
+    /// Also stream all recorded topics to Foxglove, which connects to ws://127.0.0.1:8765 or to the given port; an address
+    /// before the port (0.0.0.0:8765) lets all machines read them. Build with --features foxglove
+    #[arg(long, value_name = "PORT", num_args = 0..=1, default_missing_value = "8765")]
+    pub(crate) foxglove: Option<String>,
     /// Device of the physics: cpu; cuda and cuda:N are refused with an explanation
     #[arg(long, value_name = "DEVICE", default_value = "cpu", value_parser = device)]
     pub(crate) device: Device,

@@ -30,11 +30,15 @@ mod recorded {
             })
         }
 
-        /// Begins to record to the file of `--record`.
+        /// Begins to record to the file of `--record`, and to stream to Foxglove with `--foxglove`.
         ///
         /// # Errors
-        /// The file cannot be written, or its format cannot hold any stream of this example.
+        /// The file cannot be written, its format cannot hold any stream of this example, or the address of `--foxglove`
+        /// is invalid or in use.
         pub(crate) fn start_recording(&self, sim: &mut SimulationManager) -> Result<Recording> {
+            if let Some(address) = &self.foxglove {
+                stream_to_foxglove(sim, address).map_err(|error| format!("--foxglove: {error}"))?;
+            }
             let files = self.recording();
             if self.record.is_some() {
                 let begun = files.lock().unwrap_or_else(PoisonError::into_inner).start(sim);
@@ -47,6 +51,19 @@ mod recorded {
             }
             Ok(Recording { files: Arc::clone(files) })
         }
+    }
+
+    #[cfg(feature = "foxglove")]
+    fn stream_to_foxglove(sim: &mut SimulationManager, address: &str) -> Result {
+        use kinetoscope::record::{FoxgloveCfg, StreamToFoxglove as _};
+        let server = sim.stream_to_foxglove(FoxgloveCfg::at(address)?)?;
+        println!("Open {} in Foxglove (Open connection, Foxglove WebSocket)", server.url());
+        Ok(())
+    }
+
+    #[cfg(not(feature = "foxglove"))]
+    fn stream_to_foxglove(_: &mut SimulationManager, _: &str) -> Result {
+        Err("this build does not stream to Foxglove: build with `--features foxglove`".into())
     }
 
     /// `cfg` with the topics that `--record-view` selects.
@@ -123,14 +140,13 @@ impl Launcher {
     /// Returns a placeholder: this build does not record.
     ///
     /// # Errors
-    /// `--record` is given.
+    /// `--record` or `--foxglove` is given.
     pub(crate) fn start_recording(&self, _: &mut SimulationManager) -> Result<Recording> {
-        match self.record {
-            Some(_) => {
-                Err("--record: this build does not record; build with the features `record` and `viewer`, which are on by default"
-                    .into())
-            }
-            None => Ok(Recording),
+        match (&self.record, &self.foxglove) {
+            (None, None) => Ok(Recording),
+            _ => Err("--record, --foxglove: this build does not record; build with the features `record` and `viewer`, which \
+                      are on by default"
+                .into()),
         }
     }
 }

@@ -4,6 +4,7 @@ use crate::{GeomType, VisualModel};
 use kinetoscope_scene::mesh::TriMesh;
 use kinetoscope_scene::shape::{Box as Cuboid, Capsule, Cylinder, Ellipsoid, HeightField, Mesh, Plane, Sphere};
 use kinetoscope_scene::shape::{RenderMesh, Shape};
+use kinetoscope_scene::vector::{cross, norm, sub};
 use std::collections::HashMap;
 use std::sync::Arc;
 
@@ -95,9 +96,8 @@ const CREASE: f32 = 0.8;
 /// Unit normal of a triangle; up for one without area.
 fn face_normal(positions: &[[f32; 3]], corners: [i32; 3]) -> [f32; 3] {
     let [a, b, c] = corners.map(|i| positions.get(i as usize).copied().unwrap_or_default());
-    let [u, v] = [b, c].map(|p| [0, 1, 2].map(|i| p[i] - a[i]));
-    let n = [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]];
-    let length = n.iter().map(|x| x * x).sum::<f32>().sqrt();
+    let n = cross(sub(b, a), sub(c, a));
+    let length = norm(n);
     if length > 0.0 && length.is_finite() { n.map(|x| x / length) } else { [0.0, 0.0, 1.0] }
 }
 

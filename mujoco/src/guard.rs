@@ -8,6 +8,7 @@ use super::error::EngineError;
 use mujoco_sys as mj;
 use std::cell::Cell;
 use std::ffi::{CStr, c_char};
+use std::io::Write as _;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 
 thread_local! {
@@ -26,7 +27,13 @@ unsafe extern "C-unwind" fn on_error(message: *const c_char) {
     }
     // MuJoCo exits the process when a handler returns. Every engine call of this crate is guarded, so a message that
     // arrives here is a bug of this crate. Aborting is safer than unwinding through unknown frames.
-    tracing::error!(target: "kinetoscope_mujoco", "MuJoCo error outside a guarded call: {text}");
+    //
+    // Without a subscriber, an event is lost, and a subscriber may keep it in a buffer that is not written. A process
+    // that ends needs a reason in any case, so the message is also written here. Panics must not unwind from here.
+    let _ = writeln!(std::io::stderr(), "kinetoscope: MuJoCo error outside a guarded call: {text}");
+    let _ = catch_unwind(|| {
+        tracing::error!(target: "kinetoscope_mujoco", "MuJoCo error outside a guarded call: {text}");
+    });
     std::process::abort();
 }
 
@@ -63,4 +70,33 @@ pub(super) fn guarded<T>(call: impl FnOnce() -> T) -> Result<T, EngineError> {
         Ok(stopped) => EngineError { message: stopped.0 },
         Err(other) => resume_unwind(other),
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use kinetoscope_testkit::process;
+    use std::os::unix::process::ExitStatusExt as _;
+
+    const SIGABRT: i32 = 6;
+
+    /// Root cause: the message was an event only, so that a process without a subscriber ended without a reason.
+    #[test]
+    fn error_outside_a_guarded_call() {
+        let output = process::run(module_path!(), "unguarded_scenario", &std::env::temp_dir(), &[]);
+        let text = process::text(&output.stderr);
+        assert!(text.contains("kinetoscope: MuJoCo error outside a guarded call: too small"), "{text}");
+        assert_eq!(output.status.signal(), Some(SIGABRT), "{text}");
+    }
+
+    #[test]
+    #[ignore = "runs in a process of its own"]
+    fn unguarded_scenario() {
+        if !process::is_child() {
+            return;
+        }
+        crate::check_version().expect("headers and library belong together");
+        // SAFETY: the message is a literal with a NUL at its end and no placeholders.
+        unsafe { mj::mju_error(c"too small".as_ptr()) };
+    }
 }

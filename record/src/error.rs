@@ -1,6 +1,7 @@
 //! Errors of recording, reading and replay.
 
 use crate::format::{Format, extensions_text};
+use std::net::SocketAddr;
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -234,6 +235,20 @@ pub enum RecordError {
         write_error: Option<String>,
         /// The partial file, if it can be read.
         partial_file: Option<PathBuf>,
+    },
+    /// The text is no address of a server.
+    #[error("{given:?} is no address: use a port such as 8765, or an address and a port such as 127.0.0.1:8765")]
+    Address {
+        /// The text.
+        given: String,
+    },
+    /// A server cannot listen at an address.
+    #[error("cannot listen at {address}: {error}; choose another port, or 0 for a free one")]
+    Listen {
+        /// The address.
+        address: SocketAddr,
+        /// Cause.
+        error: Arc<std::io::Error>,
     },
     /// A limit of the format is exceeded.
     #[error("{path}: {what}")]

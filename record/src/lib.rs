@@ -13,7 +13,8 @@
 //! |---|---|
 //! | `recorder`, `cfg`, `topic`, `source`, `stream`, `overview`, `clock` | the observer: what is recorded, and when |
 //! | `packet`, `writer`, `file`, `folder` | packets, the writer thread, atomic files and folders |
-//! | `mcap_writer`, `ros`, `scene_update` | MCAP files of ROS 2 messages |
+//! | `ros_writer`, `mcap_writer`, `ros`, `scene_update` | ROS 2 messages, and MCAP files of them |
+//! | `live` | live streams to Foxglove, behind the feature `foxglove` |
 //! | `npz`, `archive` | NumPy archives |
 //! | `image_folder`, `png`, `animation` | PNG files and animations |
 //! | `episodes`, `lerobot` | datasets of episodes for learning, behind the feature `lerobot` |
@@ -45,6 +46,8 @@ mod format;
 mod image_folder;
 #[cfg(feature = "lerobot")]
 mod lerobot;
+#[cfg(feature = "foxglove")]
+mod live;
 mod mcap_writer;
 mod npz;
 mod overview;
@@ -57,6 +60,7 @@ mod recorder;
 mod recover;
 pub mod replay;
 mod ros;
+mod ros_writer;
 mod scene_file;
 mod scene_update;
 mod source;
@@ -69,6 +73,8 @@ mod writer;
 pub use cfg::RecorderCfg;
 pub use error::{RecordError, Result};
 pub use format::Format;
+#[cfg(feature = "foxglove")]
+pub use live::{FoxgloveCfg, FoxgloveServer, StreamToFoxglove};
 pub use overview::OverviewCfg;
 pub use packet::{Event, EventKind};
 pub use playback::Playback;

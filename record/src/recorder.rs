@@ -14,8 +14,11 @@ use crate::stream::StreamSchema;
 use crate::topic::Topic;
 use crate::writer::{self, FormatWriter, WriteError, WriterFailure};
 use kinetoscope_sim::{EnvId, Observer, ObserverId, SimEvent, SimulationManager, StepResult};
+#[cfg(feature = "foxglove")]
+use resolve::start_time;
 use resolve::{create_writer, packed_scene, resolve};
 use std::any::Any;
+use std::collections::BTreeSet;
 use std::fmt;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -142,7 +145,12 @@ pub struct Recorder {
     /// Scenes of the environments that were written for viewers; `None` if the file has none.
     scenes: Option<SceneTracker>,
     /// Environments whose appearance may have changed since their last scene message.
-    dirty_scenes: Vec<usize>,
+    dirty_scenes: BTreeSet<usize>,
+    /// True for a live stream, which drops rows instead of waiting for the writer.
+    is_live: bool,
+    /// True while a live stream has no clients, so that nothing is recorded.
+    is_paused: bool,
+    dropped_rows: u64,
 }
 
 impl fmt::Debug for Recorder {
@@ -157,6 +165,9 @@ const MAX_POOL_BYTES: u64 = 1 << 34;
 /// Approximate size of a packet besides its values \[bytes\].
 const PACKET_OVERHEAD: u64 = 256;
 
+/// Number of steps after which a paused live stream looks for clients.
+const PAUSED_INTERVAL: u64 = 10;
+
 impl Recorder {
     pub(crate) fn start(sim: &mut SimulationManager, cfg: RecorderCfg, disk: &StorageFactory) -> Result<Self> {
         let format = cfg.format.map_or_else(|| Format::of_path(&cfg.path), Ok)?;
@@ -169,18 +180,31 @@ impl Recorder {
             }
         }
         let (sources, left_out) = resolve(sim, &cfg, format)?;
-        let streams: Vec<StreamSchema> = sources.iter().map(|source| source.stream.clone()).collect();
-        let bytes = streams.iter().map(Packet::max_bytes).fold(PACKET_OVERHEAD, u64::saturating_add);
-        if bytes.saturating_mul(cfg.packets as u64) > MAX_POOL_BYTES {
-            return Err(RecordError::PoolTooLarge { packets: cfg.packets, bytes, max_bytes: MAX_POOL_BYTES });
-        }
+        let streams = checked_streams(&sources, &cfg)?;
         let (scene, not_in_it) = match format {
             Format::Mcap | Format::Npz if cfg.scene => packed_scene(sim),
             _ => (None, Vec::new()),
         };
         let left_out = [left_out, not_in_it].concat();
         let sink = create_writer(sim, &cfg, format, &streams, scene.as_deref(), disk)?;
-        Self::start_writer(sim, cfg, format, sources, left_out, sink)
+        Self::start_writer(sim, cfg, format, sources, left_out, sink, false)
+    }
+
+    /// Starts a recording to the clients of a server instead of a file. `sink` makes the writer from the streams and the
+    /// time at which the recording begins \[s\]. Rows are dropped while all packets wait to be written.
+    #[cfg(feature = "foxglove")]
+    pub(crate) fn start_live(
+        sim: &mut SimulationManager,
+        cfg: RecorderCfg,
+        sink: impl FnOnce(&SimulationManager, &[StreamSchema], f64) -> std::io::Result<Box<dyn FormatWriter>>,
+    ) -> Result<Self> {
+        if cfg.period_steps == 0 {
+            return Err(RecordError::OutOfRange { field: "period_steps", value: 0, min: 1 });
+        }
+        let (sources, left_out) = resolve(sim, &cfg, Format::Mcap)?;
+        let streams = checked_streams(&sources, &cfg)?;
+        let sink = sink(sim, &streams, start_time(sim)).map_err(|error| RecordError::file(&cfg.path, error))?;
+        Self::start_writer(sim, cfg, Format::Mcap, sources, left_out, sink, true)
     }
 
     /// Starts the writer thread and records the initial states into `sink`.
@@ -191,9 +215,10 @@ impl Recorder {
         sources: Vec<StreamSource>,
         left_out: Vec<String>,
         sink: Box<dyn FormatWriter>,
+        is_live: bool,
     ) -> Result<Self> {
         let streams: Vec<StreamSchema> = sources.iter().map(|source| source.stream.clone()).collect();
-        let scenes = (format == Format::Mcap && cfg.scene).then(|| SceneTracker::new(&streams));
+        let scenes = (format == Format::Mcap && cfg.scene).then(|| SceneTracker::new(&streams, is_live));
         let (full, filled) = sync_channel(cfg.packets);
         let (empty, free) = channel();
         for _ in 0..cfg.packets {
@@ -224,6 +249,9 @@ impl Recorder {
             diverged: Vec::new(),
             scenes,
             dirty_scenes: (0..sim.num_envs()).collect(),
+            is_live,
+            is_paused: false,
+            dropped_rows: 0,
         };
         let all: Vec<usize> = (0..sim.num_envs()).collect();
         recorder.record_due(sim, None, &all, None);
@@ -260,6 +288,18 @@ impl Recorder {
         // The writer thread ends only with the recorder, or by a panic.
         let ended = self.thread.as_ref().is_none_or(JoinHandle::is_finished);
         self.failure.is_some() || ended || self.failed.load(Ordering::Relaxed)
+    }
+
+    /// Stops and resumes a live stream. A paused stream keeps its clock, and resumes with the present state.
+    #[cfg(feature = "foxglove")]
+    pub(crate) fn set_paused(&mut self, paused: bool) {
+        self.is_paused = paused;
+    }
+
+    /// Number of rows that a live stream has dropped.
+    #[cfg(feature = "foxglove")]
+    pub(crate) fn dropped_rows(&self) -> u64 {
+        self.dropped_rows
     }
 
     /// Waits until the writer thread has written everything that was recorded so far, or an error occurs. The data may
@@ -331,7 +371,7 @@ impl Recorder {
         changed_envs: &[usize],
         result: Option<&StepResult>,
     ) {
-        if self.has_failed() {
+        if self.is_paused || self.has_failed() {
             return;
         }
         let Some(mut packet) = self.acquire_packet() else { return };
@@ -341,7 +381,7 @@ impl Recorder {
         packet.event = event;
         let now = self.clock.time(steps);
         if let Some(scenes) = &mut self.scenes {
-            match scenes.updates(sim, &std::mem::take(&mut self.dirty_scenes), now) {
+            match scenes.updates(sim, std::mem::take(&mut self.dirty_scenes), now) {
                 Ok(changed) => packet.scenes = changed,
                 Err(error) => return self.abort_with_packet(packet, error),
             }
@@ -394,7 +434,8 @@ impl Recorder {
         self.fail(error);
     }
 
-    /// Returns an empty packet, after a wait if necessary; `None` if the writer thread has ended.
+    /// Returns an empty packet, after a wait if necessary; `None` if the writer thread has ended, or for a live stream
+    /// without an empty packet.
     fn acquire_packet(&mut self) -> Option<Packet> {
         if let Some(packet) = self.empty_packets.pop() {
             return Some(packet);
@@ -402,6 +443,10 @@ impl Recorder {
         match self.empty.try_recv() {
             Ok(packet) => Some(packet),
             Err(TryRecvError::Disconnected) => None,
+            Err(TryRecvError::Empty) if self.is_live => {
+                self.dropped_rows += 1;
+                None
+            }
             Err(TryRecvError::Empty) => {
                 let start = Instant::now();
                 let packet = self.empty.recv().ok();
@@ -440,7 +485,7 @@ impl Recorder {
         let times = of.iter().map(|env| times[*env]).collect();
         let (step, recorded_time) = (self.clock.step(steps), self.clock.time(steps));
         let text = String::new();
-        self.dirty_scenes.extend_from_slice(&of);
+        self.dirty_scenes.extend(&of);
         self.record_due(sim, Some(Event { kind, env_ids: of.clone(), times, step, recorded_time, text }), &of, None);
     }
 
@@ -485,7 +530,7 @@ impl Recorder {
 
     /// Records an event that changed no state.
     fn record_event(&mut self, kind: EventKind, env_ids: Vec<usize>, text: String, steps: u64, times: &[f64]) {
-        if self.has_failed() {
+        if self.is_paused || self.has_failed() {
             return;
         }
         let Some(mut packet) = self.acquire_packet() else { return };
@@ -535,6 +580,16 @@ impl Recorder {
     }
 }
 
+/// The streams of sources. Checks that the pool of packets is not larger than the limit.
+fn checked_streams(sources: &[StreamSource], cfg: &RecorderCfg) -> Result<Vec<StreamSchema>> {
+    let streams: Vec<StreamSchema> = sources.iter().map(|source| source.stream.clone()).collect();
+    let bytes = streams.iter().map(Packet::max_bytes).fold(PACKET_OVERHEAD, u64::saturating_add);
+    if bytes.saturating_mul(cfg.packets as u64) > MAX_POOL_BYTES {
+        return Err(RecordError::PoolTooLarge { packets: cfg.packets, bytes, max_bytes: MAX_POOL_BYTES });
+    }
+    Ok(streams)
+}
+
 impl Drop for Recorder {
     fn drop(&mut self) {
         // Only a finished recording gets its final name. Errors cannot be reported from here.
@@ -549,6 +604,10 @@ impl Observer for Recorder {
             return u64::MAX;
         }
         let now = sim.observers().steps();
+        if self.is_paused {
+            // Counted from the steps of the simulation, since each call of `update` asks again.
+            return PAUSED_INTERVAL - now % PAUSED_INTERVAL;
+        }
         let wait = |source: &StreamSource| match (&source.sensor, source.period_steps) {
             (Some(uid), None) => sim.entities().sensor_due_in(uid).unwrap_or(u64::MAX),
             _ => source.next_step.saturating_sub(now).max(1),

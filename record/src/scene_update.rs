@@ -11,7 +11,7 @@ use kinetoscope_sim::{EnvId, EnvVisualState, SimulationManager};
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-/// Largest uncompressed size of all scene messages of a file \[bytes\].
+/// Largest uncompressed size of all scene messages of a file, or of those that a live stream sends at a time \[bytes\].
 const MAX_BYTES: u64 = 64 << 20;
 /// Number of segments of tessellated round shapes.
 const SEGMENTS: usize = 32;
@@ -158,10 +158,12 @@ pub(crate) struct SceneTracker {
     deforming: BTreeSet<String>,
     /// Environments that were skipped because of the size limit.
     omitted: BTreeSet<usize>,
+    /// True for a live stream, which does not keep its messages.
+    is_live: bool,
 }
 
 impl SceneTracker {
-    pub(crate) fn new(streams: &[StreamSchema]) -> Self {
+    pub(crate) fn new(streams: &[StreamSchema], is_live: bool) -> Self {
         let of = |stream: &StreamSchema| match &stream.kind {
             StreamKind::Poses { frames } => frames.clone(),
             _ => Vec::new(),
@@ -175,6 +177,7 @@ impl SceneTracker {
             without_pose: BTreeSet::new(),
             deforming: BTreeSet::new(),
             omitted: BTreeSet::new(),
+            is_live,
         }
     }
 
@@ -183,12 +186,20 @@ impl SceneTracker {
     ///
     /// # Errors
     /// There is no such environment.
-    pub(crate) fn updates(&mut self, sim: &mut SimulationManager, envs: &[usize], at: f64) -> Result<Vec<SceneUpdate>> {
+    pub(crate) fn updates(
+        &mut self,
+        sim: &mut SimulationManager,
+        envs: BTreeSet<usize>,
+        at: f64,
+    ) -> Result<Vec<SceneUpdate>> {
         let mut updates = Vec::new();
+        if self.is_live {
+            self.bytes_left = MAX_BYTES;
+        }
         // Most environments share one scene.
         let mut known: Vec<(Arc<RenderScene>, InstanceVisuals)> = Vec::new();
         let groups = RasterCfg::default().groups;
-        for &env in envs {
+        for env in envs {
             let Some(told) = self.last_scenes.get_mut(&env) else { continue };
             let scene = sim.scene_mut().env_scene(EnvId(env))?;
             if told.as_ref().is_some_and(|told| Arc::ptr_eq(told, &scene)) {

@@ -1,6 +1,7 @@
 //! Camera placement in which the drawn scene fills the image.
 
 use crate::shape::Shape;
+use crate::vector::{cross, norm, sub};
 use crate::{Instance, PoseF32, RenderScene};
 
 /// Instances of a scene at their poses, shifted by an offset.
@@ -143,16 +144,12 @@ fn bounds(framed: &[DrawnInstance<'_>]) -> Option<[[f64; 3]; 2]> {
 }
 
 fn diagonal([low, high]: [[f64; 3]; 2]) -> f64 {
-    (0..3).map(|k| (high[k] - low[k]).powi(2)).sum::<f64>().sqrt()
+    norm(sub(high, low))
 }
 
 fn unit(a: [f64; 3]) -> Option<[f64; 3]> {
-    let length = a.iter().map(|x| x * x).sum::<f64>().sqrt();
+    let length = norm(a);
     (length > 1e-9 && length.is_finite()).then(|| a.map(|x| x / length))
-}
-
-fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
 #[cfg(test)]

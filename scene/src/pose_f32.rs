@@ -1,6 +1,7 @@
 //! Poses of the renderer: a rotation matrix and a translation in single precision.
 
 use crate::Pose;
+use crate::vector::{cross, dot};
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 
 /// A rigid transform in `f32`, row-major: `x -> rotation * x + translation`.
@@ -89,12 +90,7 @@ impl PoseF32 {
     /// True if every number is finite and the matrix is a rotation, within 1e-3.
     pub fn is_rigid(&self) -> bool {
         let r = &self.rotation;
-        let dot = |a: [f32; 3], b: [f32; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-        let cross = [
-            r[0][1] * r[1][2] - r[0][2] * r[1][1],
-            r[0][2] * r[1][0] - r[0][0] * r[1][2],
-            r[0][0] * r[1][1] - r[0][1] * r[1][0],
-        ];
+        let cross = cross(r[0], r[1]);
         let near = |x: f32, y: f32| (x - y).abs() < 1e-3;
         self.translation.iter().all(|t| t.is_finite())
             && near(dot(r[0], r[0]), 1.)

@@ -1,23 +1,41 @@
-//! Three-dimensional vectors in double precision.
+//! Three-dimensional vectors as arrays, which meshes and renderers store: the only place of these functions.
+//!
+//! The sums have the order of nalgebra's, so that both have the same bits. The functions are in the inner loops of the
+//! renderers.
 
-/// Three coordinates.
+use nalgebra::RealField;
+use std::ops::{Add, Mul, Sub};
+
+/// Three coordinates in double precision.
 pub type V3 = [f64; 3];
 
 /// Dot product.
 #[inline(always)]
-pub fn dot(a: V3, b: V3) -> f64 {
+pub fn dot<T: Copy + Add<Output = T> + Mul<Output = T>>(a: [T; 3], b: [T; 3]) -> T {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
 /// Cross product `a × b`.
 #[inline(always)]
-pub fn cross(a: V3, b: V3) -> V3 {
+pub fn cross<T: Copy + Sub<Output = T> + Mul<Output = T>>(a: [T; 3], b: [T; 3]) -> [T; 3] {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+}
+
+/// Length.
+#[inline(always)]
+pub fn norm<T: RealField + Copy>(a: [T; 3]) -> T {
+    dot(a, a).sqrt()
+}
+
+/// Sum `a + b`.
+#[inline(always)]
+pub fn add<T: Copy + Add<Output = T>>(a: [T; 3], b: [T; 3]) -> [T; 3] {
+    [a[0] + b[0], a[1] + b[1], a[2] + b[2]]
 }
 
 /// Difference `a - b`.
 #[inline(always)]
-pub fn sub(a: V3, b: V3) -> V3 {
+pub fn sub<T: Copy + Sub<Output = T>>(a: [T; 3], b: [T; 3]) -> [T; 3] {
     [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
 }
 
@@ -50,4 +68,30 @@ pub fn normalize(a: V3) -> Option<V3> {
 #[inline(always)]
 pub fn to_f64(a: [f32; 3]) -> V3 {
     a.map(f64::from)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::Vector3;
+
+    /// nalgebra is the reference, in both precisions, for each bit.
+    #[test]
+    fn same_bits_as_nalgebra() {
+        fn check<T: RealField + Copy>(a: [T; 3], b: [T; 3]) {
+            let (u, v) = (Vector3::from(a), Vector3::from(b));
+            assert!(dot(a, b) == u.dot(&v) && norm(a) == u.norm());
+            assert!(cross(a, b) == <[T; 3]>::from(u.cross(&v)));
+            assert!(add(a, b) == <[T; 3]>::from(u + v) && sub(a, b) == <[T; 3]>::from(u - v));
+        }
+        for k in 0..100 {
+            let x = |i: i32| f64::from(k * 7 + i).sin() * 10f64.powi(k % 9 - 4);
+            let (a, b) = ([x(0), x(1), x(2)], [x(3), x(4), x(5)]);
+            check(a, b);
+            check(a.map(|x| x as f32), b.map(|x| x as f32));
+        }
+        // Control: another order of the sum has other bits.
+        let a = [1e16, -1e16, 1.0];
+        assert!(dot(a, [1.0; 3]) == 1.0 && a[0] + (a[1] + a[2]) == 0.0);
+    }
 }

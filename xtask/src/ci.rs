@@ -8,8 +8,8 @@ use crate::setup::{self, MujocoVersion, Prepared, Requirement, Requirements};
 use crate::source_check::files_below;
 use crate::test::{self, TestArgs};
 use crate::{
-    dependencies, docs_check, examples, import_cycles, language, mutate, own_time, package, python_cfg, python_package,
-    python_simulation, site, source_check, spelling, wheel,
+    deny, dependencies, docs_check, examples, import_cycles, language, msrv, mutate, own_time, package, python_cfg,
+    python_package, python_simulation, site, source_check, spelling, wheel,
 };
 use serde_json::json;
 use std::collections::BTreeSet;
@@ -91,11 +91,24 @@ const STAGES: &[Stage] = &[
         run: |c| docs_check::run(c.repo),
     },
     Stage {
+        name: "deny",
+        what: "licenses, sources and known faults of third-party crates",
+        // It asks the registry.
+        when: When::Full,
+        run: |c| deny::run(c.repo),
+    },
+    Stage {
         name: "package",
         what: "packages for crates.io",
         // It asks the registry.
         when: When::Full,
         run: |c| package::run(c.repo, &c.debian()?),
+    },
+    Stage {
+        name: "msrv",
+        what: "the oldest supported Rust",
+        when: When::Full,
+        run: |c| msrv::run(c.repo, &c.debian()?),
     },
     Stage { name: "clippy", what: "lints", when: When::Always, run: |c| clippy(&c.debian()?, &["--workspace"]) },
     Stage { name: "unit", what: "unit tests, MuJoCo 2.2.2", when: When::Quick, run: unit_tests },

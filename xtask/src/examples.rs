@@ -65,8 +65,10 @@ const TABLE: &[ExampleRun] = &[
     row("create_robot", &[2], "--headless --steps 1 --robot quadruped/quadruped.xml --arm-urdf sr5/SR5.urdf"),
     row("create_robot", &[2], "--headless --steps 1 --robot {out}/there_is_no_such_file.xml"),
     row("create_robot", &[0], "--headless --num-envs 2 --steps 200 --record {out}/create_robot.mcap"),
-    // Examples are built with the feature `lerobot`, as the tests are.
+    // Examples are built with the features `lerobot` and `foxglove`, as the tests are.
     row("create_robot", &[0], "--headless --num-envs 2 --steps 100 --record {out}/create_robot.lerobot"),
+    row("create_robot", &[0], "--headless --num-envs 2 --steps 100 --foxglove 0"),
+    row("create_robot", &[2], "--headless --steps 1 --foxglove robot:1"),
     row(
         "run_camera",
         &[0],

@@ -1,10 +1,14 @@
 //! Checks that all crates can be published: their manifests, the content of the packages, and the documentation as
 //! docs.rs builds it.
 
-use crate::run::{Repo, XtaskResult, in_ci, no_findings};
+use crate::run::{Failure, Repo, XtaskResult, in_ci, no_findings};
 use crate::setup::Prepared;
 use crate::test;
 use serde_json::Value;
+use std::path::{Path, PathBuf};
+
+/// Folder of the committed declarations of MuJoCo 2.2.2.
+const DECLARATIONS: &str = "mujoco-sys/docs_rs";
 
 /// Checks the manifests and makes all packages, without compiling them again.
 pub(crate) fn run(repo: &Repo, ready: &Prepared) -> XtaskResult {
@@ -18,18 +22,48 @@ pub(crate) fn run(repo: &Repo, ready: &Prepared) -> XtaskResult {
     cargo.run()
 }
 
-/// Documents the facade as docs.rs does: without MuJoCo's headers, with the committed declarations.
+/// Documents the facade as docs.rs does: without MuJoCo's headers, with the committed declarations. Checks first that
+/// these are the declarations that the build generates. `ready` has MuJoCo 2.2.2.
 pub(crate) fn docs_rs(repo: &Repo, ready: &Prepared) -> XtaskResult {
+    let check = ["check", "--package", "kinetoscope-mujoco-sys", "--message-format", "json"];
+    let messages = ready.cargo().args(check).args(test::SHARED_FEATURES).output()?;
+    let messages = String::from_utf8_lossy(&messages).into_owned();
+    let out = out_dir(&messages, &repo.root.join("mujoco-sys"))
+        .ok_or_else(|| Failure::new("cargo did not name the folder of mujoco-sys's build script"))?;
+    let what = format!("the declarations in {DECLARATIONS} are not those that its build generates");
+    no_findings(&what, &outdated(&repo.root.join(DECLARATIONS), &out))?;
     // CI shares the compiled dependencies with other stages. Elsewhere, the pages would replace those of `cargo doc`.
     let folder = if in_ci() { repo.target.clone() } else { repo.target.join("docs-rs") };
     let cargo = ready.cargo().env("DOCS_RS", "1").env("MUJOCO_DIR", repo.target.join("without-mujoco"));
     let cargo = cargo.env("CARGO_TARGET_DIR", &folder).env("RUSTDOCFLAGS", "-D warnings");
-    let features = ["download", "lerobot", "relocated-assets"].map(|name| format!("kinetoscope/{name}"));
+    let features = ["download", "foxglove", "lerobot", "relocated-assets"].map(|name| format!("kinetoscope/{name}"));
     cargo
         .args(["doc", "--no-deps", "--package", "kinetoscope"])
         .args(test::SHARED_FEATURES)
         .args(["--features", &features.join(",")])
         .run()
+}
+
+/// The output folder of the build script of the package in `folder`, from cargo's messages.
+fn out_dir(messages: &str, folder: &Path) -> Option<PathBuf> {
+    let is_of = |message: &Value| {
+        let id = message["package_id"].as_str().unwrap_or_default();
+        message["reason"] == "build-script-executed" && id.contains(&format!("{}#", folder.display()))
+    };
+    let mut messages = messages.lines().filter_map(|line| serde_json::from_str::<Value>(line).ok());
+    messages.find(is_of).and_then(|message| message["out_dir"].as_str().map(PathBuf::from))
+}
+
+/// Committed files (`NAME.txt`) that differ from the generated ones (`NAME` in `out`).
+fn outdated(committed: &Path, out: &Path) -> Vec<String> {
+    let differs = |name: &&str| {
+        let [old, new] = [committed.join(format!("{name}.txt")), out.join(name)].map(std::fs::read);
+        !matches!((old, new), (Ok(old), Ok(new)) if old == new)
+    };
+    let names = ["bindings.rs", "fields.rs"].into_iter().filter(differs);
+    names
+        .map(|name| format!("cp {} {}", out.join(name).display(), committed.join(format!("{name}.txt")).display()))
+        .collect()
 }
 
 /// Members of the workspace that are published.
@@ -68,6 +102,36 @@ fn mistakes(package: &Value) -> Vec<String> {
 mod tests {
     use super::*;
     use serde_json::json;
+
+    /// An old, a missing and an empty declaration are reported with the command that replaces it.
+    #[test]
+    fn outdated_declarations() {
+        let dir = tempfile::tempdir().expect("a scratch folder");
+        let (committed, out) = (dir.path().join("docs_rs"), dir.path().join("out"));
+        let write = |path: PathBuf, text| crate::wheel::tests::write(&path, text);
+        for name in ["bindings.rs", "fields.rs"] {
+            write(out.join(name), "new");
+            write(committed.join(format!("{name}.txt")), "new");
+        }
+        assert!(outdated(&committed, &out).is_empty());
+        write(committed.join("fields.rs.txt"), "old");
+        let found = outdated(&committed, &out);
+        assert!(found.len() == 1 && found[0].starts_with("cp ") && found[0].ends_with("fields.rs.txt"), "{found:?}");
+        std::fs::remove_file(out.join("bindings.rs")).expect("removable");
+        assert_eq!(outdated(&committed, &out).len(), 2);
+    }
+
+    #[test]
+    fn output_folder() {
+        let message = |folder: &str, out: &str| {
+            json!({"reason": "build-script-executed", "package_id": format!("path+file:///a/{folder}#x@1"), "out_dir": out})
+                .to_string()
+        };
+        let other = json!({"reason": "compiler-artifact", "package_id": "path+file:///a/sys#x@1"}).to_string();
+        let messages = [other, message("look", "/out/1"), message("sys", "/out/2")].join("\n");
+        assert_eq!(out_dir(&messages, Path::new("/a/sys")), Some(PathBuf::from("/out/2")));
+        assert_eq!(out_dir(&messages, Path::new("/a/robot")), None);
+    }
 
     #[test]
     fn manifests() {

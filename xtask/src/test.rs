@@ -47,7 +47,7 @@ pub(crate) const SHARED_FEATURES: [&str; 8] = [
     "--package",
     "kinetoscope-python-render",
     "--features",
-    "kinetoscope-cli/lerobot",
+    "kinetoscope-cli/foxglove,kinetoscope-cli/lerobot",
 ];
 
 /// Cargo arguments that select the packages for the tests on the second MuJoCo version: packages with version-dependent
@@ -130,19 +130,19 @@ fn cargo_args(args: &TestArgs, packages: &[&str], left_out: &[SkippedTests]) -> 
     words
 }
 
-/// Crates with the feature `lerobot`, which is off by default.
-const WITH_LEROBOT: [&str; 3] = ["kinetoscope", "kinetoscope-cli", "kinetoscope-record"];
+/// Features that are off by default, and crates that have them.
+const FEATURES: [&str; 2] = ["foxglove", "lerobot"];
+const WITH_FEATURES: [&str; 3] = ["kinetoscope", "kinetoscope-cli", "kinetoscope-record"];
 
 /// Cargo arguments for the features to test besides the default ones, for these packages.
 pub(crate) fn features(packages: &[&str]) -> Vec<String> {
-    let feature = match packages {
-        ["--workspace"] => "kinetoscope-cli/lerobot".to_string(),
-        _ => match WITH_LEROBOT.iter().find(|name| packages.contains(name)) {
-            Some(package) => format!("{package}/lerobot"),
-            None => return Vec::new(),
-        },
+    let package = match packages {
+        ["--workspace"] => Some("kinetoscope-cli"),
+        _ => WITH_FEATURES.into_iter().find(|name| packages.contains(name)),
     };
-    vec!["--features".into(), feature]
+    let Some(package) = package else { return Vec::new() };
+    let features = FEATURES.map(|feature| format!("{package}/{feature}"));
+    vec!["--features".into(), features.join(",")]
 }
 
 #[cfg(test)]
@@ -152,18 +152,18 @@ mod tests {
     #[test]
     fn whole_workspace() {
         let words = cargo_args(&TestArgs::default(), &["--workspace"], &[NEEDS_MUJOCO_4]);
-        let expected =
-            "test --workspace --features kinetoscope-cli/lerobot -- --include-ignored --skip mujoco_renderer";
+        let expected = "test --workspace --features kinetoscope-cli/foxglove,kinetoscope-cli/lerobot -- --include-ignored --skip mujoco_renderer";
         assert_eq!(words.join(" "), expected);
     }
 
     #[test]
     fn features_of_packages() {
-        for package in WITH_LEROBOT {
-            assert_eq!(features(&["--package", package]), ["--features".to_string(), format!("{package}/lerobot")]);
+        for package in WITH_FEATURES {
+            let expected = format!("{package}/foxglove,{package}/lerobot");
+            assert_eq!(features(&["--package", package]), ["--features".to_string(), expected]);
         }
         assert!(features(&["--package", "kinetoscope-sim"]).is_empty());
-        assert_eq!(features(&version_dependent_packages()), ["--features", "kinetoscope/lerobot"]);
+        assert_eq!(features(&version_dependent_packages()), ["--features", "kinetoscope/foxglove,kinetoscope/lerobot"]);
     }
 
     #[test]

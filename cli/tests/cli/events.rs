@@ -7,7 +7,7 @@ use kinetoscope::viewer::{Closed, ServeCfg, WindowCfg};
 use kinetoscope_testkit::events::{self, Collected, collected};
 use kinetoscope_testkit::urdf::TempFiles;
 use kinetoscope_testkit::worlds::{self, cfg, row, sim};
-use kinetoscope_testkit::{wait, x_server};
+use kinetoscope_testkit::{process, wait, x_server};
 
 /// The only event that `select` accepts.
 #[track_caller]
@@ -66,23 +66,35 @@ fn divergence() {
 }
 
 /// Buffers of MuJoCo that were too small: an event for each growth. The text of MuJoCo's own warning is for debugging.
+///
+/// The growths are counted in a process of their own. Root cause of a wrong count: environment 0 of other tests, which
+/// run in parallel in one process, emits the same events.
 #[test]
 fn grown_buffers() {
+    process::assert_passes(module_path!(), "grown_buffers_scenario", &[]);
+}
+
+#[test]
+#[ignore = "runs in a process of its own"]
+fn grown_buffers_scenario() {
+    if !process::is_child() {
+        return;
+    }
     events::start();
     let mut sim = sim(cfg(1, 1));
     for i in 0..60 {
         let [x, y] = [f64::from(i % 8), f64::from(i / 8)].map(|k| 0.3 * k);
         sim.add_rigid_object(worlds::cube(&format!("cube{i}"), 0.2, 1.0, [x, y, 0.15])).unwrap();
     }
-    let before = sim.warnings().buffer_growths();
     // The cubes land after 0.1 s.
     sim.update(15);
-    let growths = sim.warnings().buffer_growths() - before;
-    let doubled = |event: &Collected| event.message == "a buffer of MuJoCo was doubled";
-    let events = collected(|event| doubled(event) && event.fields.get("env").is_some_and(|env| env == "0"));
-    assert!(growths > 0 && events.len() as u64 >= growths, "{growths} {events:?}");
-    check(&events[0], "kinetoscope_sim", "INFO", &[("env", "0")]);
-    assert!(["what", "bytes"].iter().all(|field| events[0].fields.contains_key(field)), "{:?}", events[0]);
+    let growths = sim.warnings().buffer_growths();
+    let events = collected(|event| event.message == "a buffer of MuJoCo was doubled");
+    assert!(growths > 0 && events.len() as u64 == growths, "{growths} {events:?}");
+    for event in &events {
+        check(event, "kinetoscope_sim", "INFO", &[("env", "0")]);
+        assert!(["what", "bytes"].iter().all(|field| event.fields.contains_key(field)), "{event:?}");
+    }
 }
 
 /// A recorder that cannot follow: choosing the colors of a GIF takes longer than drawing an empty scene.

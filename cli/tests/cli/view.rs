@@ -48,6 +48,30 @@ fn page_and_ctrl_c() {
     assert_eq!(running.ended().code(), Some(0));
 }
 
+/// The stream to Foxglove has a server beside the view. Its messages are tested in the crate `record`.
+#[cfg(feature = "foxglove")]
+#[test]
+fn foxglove() {
+    let shell = CommandFolder::with_arm();
+    let mut running = RunningCommand::start(&mut shell.command("view arm.urdf --serve 127.0.0.1:0 --foxglove 0"));
+    let line = running.line();
+    let address = line.split("ws://").nth(1).and_then(|rest| rest.split(' ').next()).unwrap();
+    assert!(std::net::TcpStream::connect(address).is_ok(), "{line}");
+    let err = shell.run_refused(&format!("view arm.urdf --serve 127.0.0.1:0 --foxglove {address}"));
+    assert!(err.contains("--foxglove: cannot listen at") && err.contains(address), "{err}");
+    running.interrupt();
+    assert_eq!(running.ended().code(), Some(0));
+    let err = shell.run_refused("view arm.urdf --serve 127.0.0.1:0 --foxglove robot");
+    assert!(err.contains("--foxglove: \"robot\" is no address"), "{err}");
+}
+
+#[cfg(not(feature = "foxglove"))]
+#[test]
+fn foxglove() {
+    let err = CommandFolder::with_arm().run_refused("view arm.urdf --serve 127.0.0.1:0 --foxglove");
+    assert!(err.contains("--features foxglove"), "{err}");
+}
+
 /// A recording is complete at every regular end.
 #[test]
 fn recording() {

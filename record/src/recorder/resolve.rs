@@ -6,8 +6,9 @@ use crate::error::{RecordError, Result};
 use crate::file::{PartialFile, StorageFactory, parent_dir};
 use crate::format::Format;
 use crate::image_folder::ImageFolderWriter;
-use crate::mcap_writer::{self, McapWriter};
+use crate::mcap_writer::McapWriter;
 use crate::npz::{self, NpzWriter};
+use crate::ros_writer;
 use crate::scene_file::{self, SCENE_ARCHIVE};
 use crate::source::StreamSource;
 use crate::stream::{StreamKind, StreamSchema};
@@ -88,7 +89,7 @@ pub(super) fn resolve(
     }
     if format == Format::Mcap
         && let Some(name) =
-            mcap_writer::topic_conflict(&sources.iter().map(|source| &source.stream).collect::<Vec<_>>(), cfg.scene)
+            ros_writer::topic_conflict(&sources.iter().map(|source| &source.stream).collect::<Vec<_>>(), cfg.scene)
     {
         return Err(RecordError::DuplicateName { path: cfg.path.clone(), name });
     }
@@ -222,7 +223,7 @@ pub(super) fn create_writer(
     let storage = disk.storage(file);
     let sink: Result<Box<dyn FormatWriter>> = match format {
         Format::Mcap => {
-            let start = sim.time().iter().copied().fold(f64::INFINITY, f64::min);
+            let start = start_time(sim);
             let (masks, dt) = (sim.scene().mask_ids(), sim.cfg().physics_dt);
             let about = npz::metadata(streams, masks, dt).to_string().into_bytes();
             let failed = |error| RecordError::file(&cfg.path, error);
@@ -258,6 +259,11 @@ pub(super) fn create_writer(
         }
     };
     sink
+}
+
+/// Time at which a recording of all environments begins \[s\]: the earliest one.
+pub(super) fn start_time(sim: &SimulationManager) -> f64 {
+    sim.time().iter().copied().fold(f64::INFINITY, f64::min)
 }
 
 /// Width and height of an image stream \[pixels\]; `None` for other streams.

@@ -58,7 +58,7 @@ fn record_to(
     let cfg = cfg.with_topics([Topic::MjcfState("ball".into())]);
     let (sources, left_out) = resolve(sim, &cfg, Format::Mcap).unwrap();
     let recorder =
-        Recorder::start_writer(sim, cfg, Format::Mcap, sources, left_out, Box::new(FnWriter(write))).unwrap();
+        Recorder::start_writer(sim, cfg, Format::Mcap, sources, left_out, Box::new(FnWriter(write)), false).unwrap();
     sim.observers_mut().add(recorder)
 }
 

@@ -16,4 +16,4 @@ pub(crate) use message::{
 };
 pub(crate) use read::{MessageType, PathSegment, Value};
 pub(crate) use scene::scene_update;
-pub(crate) use schema::{SCENE_UPDATE, Schema};
+pub(crate) use schema::{ENCODING, SCENE_UPDATE, SCHEMA_ENCODING, Schema};

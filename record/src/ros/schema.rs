@@ -1,5 +1,9 @@
 //! Message definitions, in ROS 2's `ros2msg` format.
 
+/// Encoding of messages, and of their definitions.
+pub(crate) const ENCODING: &str = "cdr";
+pub(crate) const SCHEMA_ENCODING: &str = "ros2msg";
+
 /// Types of recorded messages.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub(crate) enum Schema {

@@ -4,6 +4,7 @@ use super::Optics;
 use crate::optics_error::OpticsError;
 use crate::raster::tile::{BLOCK, SAMPLES};
 use crate::simd::{F, LANES, Simd, V3, load};
+use kinetoscope_scene::vector::{dot, norm};
 use std::fmt;
 use std::sync::OnceLock;
 
@@ -303,12 +304,8 @@ impl fmt::Debug for LensRays {
     }
 }
 
-fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
 fn unit(a: [f64; 3]) -> Option<[f64; 3]> {
-    let length = dot(a, a).sqrt();
+    let length = norm(a);
     (length > 0.0).then(|| a.map(|x| x / length))
 }
 

@@ -34,7 +34,7 @@ use emitter::{Emitters, power_heuristic};
 use interaction::SurfaceInteraction;
 use kinetoscope_scene::Ray;
 use kinetoscope_scene::basis::OrthonormalBasis;
-use kinetoscope_scene::vector::{V3, add_scaled, dot, scale, to_f64};
+use kinetoscope_scene::vector::{V3, add, add_scaled, dot, scale, to_f64};
 use kinetoscope_scene::{Light, LightingSpace, PoseF64, RenderScene, Texture};
 use light_source::LightSource;
 use sobol::{SobolSample, SobolSequence};
@@ -375,10 +375,6 @@ fn offset_origin(point: &SurfaceInteraction, side: f64) -> V3 {
 
 fn times(a: V3, b: V3) -> V3 {
     [0, 1, 2].map(|k| a[k] * b[k])
-}
-
-fn add(a: V3, b: V3) -> V3 {
-    [0, 1, 2].map(|k| a[k] + b[k])
 }
 
 /// Brightness (luminance) of a color. Source: ITU-R BT.709.

@@ -7,6 +7,7 @@ use crate::visibility::Projection;
 use kinetoscope_scene::PoseF32;
 use kinetoscope_scene::shape::Cluster;
 use kinetoscope_scene::shape::RenderMesh;
+use kinetoscope_scene::vector::{cross, dot, sub};
 
 const MAX_VERTICES: usize = 3 * RenderMesh::MAX_CLUSTER_TRIANGLES;
 /// Adding and subtracting this rounds to an integer (below 2^22). `round()` would be a library call.
@@ -128,22 +129,14 @@ fn transform<S: Simd>(s: S, v: &mut Vertices, mesh: &RenderMesh, cluster: &Clust
     all_good
 }
 
-fn sub(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
-    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
-}
-
 /// Nearness gradient of a triangle's plane, from its unsnapped corners. A ray (x, y, 1) meets the plane n·p = d at the
 /// nearness 1/z = n·(x, y, 1) / d, which is linear in the pixels. `at` is the first corner in the image, `polygon`
 /// holds the nearness of the rasterized corners, the first corner first.
 #[inline(always)]
 fn gradient(projection: &Projection, p: [[f32; 3]; 3], at: [f32; 2], polygon: &[f32]) -> Gradient {
     let (u, v) = (sub(p[1], p[0]), sub(p[2], p[0]));
-    let n = [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]];
-    let (d, scale) = if projection.parallel {
-        (n[2], 1.0 / projection.far)
-    } else {
-        (n[0] * p[0][0] + n[1] * p[0][1] + n[2] * p[0][2], 1.0)
-    };
+    let n = cross(u, v);
+    let (d, scale) = if projection.parallel { (n[2], 1.0 / projection.far) } else { (dot(n, p[0]), 1.0) };
     let k = if d == 0.0 { 0.0 } else { scale / d };
     let finite = |x: f32| if x.is_finite() { x } else { 0.0 };
     let (mut low, mut high) = (f32::MAX, f32::MIN);

@@ -7,6 +7,7 @@ use crate::visibility::Projection;
 use crate::visibility::projection::LocalCamera;
 use kinetoscope_scene::shape::Cluster;
 use kinetoscope_scene::shape::{RenderMesh, Shape};
+use kinetoscope_scene::vector::{dot, norm, sub};
 use kinetoscope_scene::{Instance, LightingSpace, Marker, PoseF32, RenderScene};
 
 /// A primitive or a cluster that may be visible.
@@ -235,14 +236,13 @@ fn faces_away(projection: &Projection, placed: &PlacedInstance, cluster: &Cluste
         return false;
     }
     let camera = &placed.local.instance_from_camera;
-    let dot = |a: [f32; 3], b: [f32; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
     let sine = (1.0 - cluster.cone_cos * cluster.cone_cos).max(0.0).sqrt();
     if projection.parallel {
         return dot(camera.rotate([0., 0., 1.]), cluster.cone_axis) > sine + 1e-4;
     }
     let t = camera.translation;
-    let to = [0, 1, 2].map(|k| cluster.center[k] - t[k]);
-    dot(to, cluster.cone_axis) > sine * dot(to, to).sqrt() + 1.01 * cluster.radius
+    let to = sub(cluster.center, t);
+    dot(to, cluster.cone_axis) > sine * norm(to) + 1.01 * cluster.radius
 }
 
 /// Returns the blocks that a box may touch, as [`DrawItem::rect`], and an upper bound of its nearness; `None` if the
@@ -289,12 +289,11 @@ fn bounds(
 /// the depth range allows it, else `None`. Blocks are tested later.
 fn lens_bounds(projection: &Projection, lens: &LensRays, middle: [f32; 3], half: [f32; 3]) -> Option<([u16; 4], f32)> {
     let everywhere = full_rect(projection);
-    let length = |v: [f32; 3]| (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]).sqrt();
-    let radius = 1.0001 * length(half);
+    let radius = 1.0001 * norm(half);
     if !radius.is_finite() {
         return Some((everywhere, f32::MAX));
     }
-    let at = if lens.is_forward() { middle[2] } else { length(middle) };
+    let at = if lens.is_forward() { middle[2] } else { norm(middle) };
     let (near, far) = (at - radius - 1e-4 * at.abs(), at + radius + 1e-4 * at.abs());
     if far < projection.near || near > projection.far {
         return None;

@@ -7,6 +7,7 @@ use super::surface::{InstanceSurface, Surface};
 use super::texture::{self, MipRule};
 use super::tone::{self, BlendSpace};
 use crate::simd::{F, M, Simd, V3, abs, max, min, select, splat, sqrt_or_zero};
+use kinetoscope_scene::vector::norm;
 use kinetoscope_scene::{Light, LightKind, LightingSpace, Material, OpenGlRules, RenderScene, Texture};
 use std::sync::Arc;
 
@@ -94,7 +95,7 @@ pub(crate) struct ViewRays<S: Simd> {
 }
 
 pub(crate) fn unit(v: [f32; 3]) -> [f32; 3] {
-    let length = (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]).sqrt();
+    let length = norm(v);
     if length > 0.0 && length.is_finite() { v.map(|x| x / length) } else { [0., 0., -1.] }
 }
 

@@ -3,6 +3,7 @@
 use super::light::unit;
 use crate::visibility::Projection;
 use kinetoscope_scene::shape::Shape;
+use kinetoscope_scene::vector::dot;
 use kinetoscope_scene::{Instance, Light, LightKind, OpenGlRules, PoseF32, RenderScene};
 
 /// Margin around the covered part, in texels: for the taps around a point and for its offset along the normal.
@@ -67,10 +68,6 @@ pub(super) struct LightView {
     cone: Extent,
     /// True if shadows end at this range: then the map covers no more.
     clips: bool,
-}
-
-fn dot(a: [f32; 3], b: [f32; 3]) -> f32 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
 /// Returns a rotation matrix, as rows, whose third column is the unit vector `z`. Source: Duff et al., Building an

@@ -5,6 +5,7 @@ use std::hash::{BuildHasherDefault, Hasher};
 
 use super::error::ReadContext;
 use super::{MeshError, MeshMaterial, Submesh, TriMesh};
+use crate::vector::{cross, norm, sub};
 
 /// Largest number of triangles that a file may expand to. It is far above any robot part, and keeps a few malicious
 /// lines of instances from filling the memory.
@@ -115,27 +116,15 @@ impl Builder {
 /// Vector scaled to unit length; `None` for a vector that is not finite or not longer than 1e-20.
 pub(super) fn unit(v: [f32; 3]) -> Option<[f32; 3]> {
     let v = v.map(f64::from);
-    let length = (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]).sqrt();
+    let length = norm(v);
     (length.is_finite() && length > 1e-20).then(|| v.map(|x| (x / length) as f32 + 0.0))
 }
 
 fn face_normal(corners: &[Corner; 3]) -> Option<[f32; 3]> {
     let [a, b, c] = corners.map(|c| c.position.map(f64::from));
     let n = cross(sub(b, a), sub(c, a));
-    let length = (n[0] * n[0] + n[1] * n[1] + n[2] * n[2]).sqrt();
+    let length = norm(n);
     (length > 0.0 && length.is_finite()).then(|| n.map(|x| (x / length) as f32 + 0.0))
-}
-
-pub(super) fn sub(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
-}
-
-pub(super) fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-}
-
-pub(super) fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
 struct Welder {

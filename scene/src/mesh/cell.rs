@@ -5,7 +5,7 @@
 //! surface gives the first two kinds. This module gives the third, so that the hull of a piece includes the inside of
 //! the solid.
 
-use super::builder::{cross, dot, sub};
+use crate::vector::{cross, dot, sub};
 
 type V3 = [f64; 3];
 

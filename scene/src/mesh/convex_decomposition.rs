@@ -5,9 +5,9 @@
 //! the corners of its [cell](super::cell) that are in the solid. It therefore contains the whole intersection of the
 //! solid and the cell.
 
-use super::builder::{cross, dot, sub};
 use super::cell::{Cell, winding_number};
 use super::{HullCfg, HullError, TriMesh, convex_hull};
+use crate::vector::{cross, dot, sub};
 use serde::{Deserialize, Serialize};
 
 /// Version of the algorithm. It changes whenever the same input may give other pieces; part of the key of

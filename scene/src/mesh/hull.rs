@@ -10,8 +10,8 @@
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeSet, BinaryHeap, HashMap};
 
-use super::builder::{cross, dot, sub};
 use super::{HullError, TriMesh};
+use crate::vector::{cross, dot, norm, sub};
 
 /// Version of the algorithm. It changes whenever the same input may give another hull; part of the key of
 /// [`super::HullCache`].
@@ -112,10 +112,6 @@ fn diagonal(points: &[[f64; 3]]) -> f64 {
         }
     }
     norm(sub(hi, lo))
-}
-
-fn norm(v: [f64; 3]) -> f64 {
-    dot(v, v).sqrt()
 }
 
 /// Four extreme points, the distance of the third from the line and of the fourth from the plane of the points before.

@@ -48,7 +48,7 @@ fn signed_area_doubled(a: [f64; 2], b: [f64; 2], c: [f64; 2]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mesh::builder::{cross, sub};
+    use crate::vector::{cross, sub};
 
     fn area(points: &[[f64; 3]], triangles: &[[usize; 3]]) -> f64 {
         let of = |t: &[usize; 3]| {

@@ -4,8 +4,8 @@
 use kinetoscope_testkit::test_resources::{files_below, robots_dir};
 use std::path::PathBuf;
 
-use super::builder::{cross, dot, sub};
 use super::{MeshMaterial, TextureSource, TriMesh, load};
+use crate::vector::{cross, dot, sub};
 
 /// A small random generator (xorshift64*), so that every run tests the same data.
 pub(super) struct TestRng(pub(super) u64);

@@ -1,9 +1,10 @@
 //! Operations on meshes.
 
 use super::affine::PreparedAffine;
-use super::builder::{cross, dot, unit};
+use super::builder::unit;
 use super::{Submesh, TriMesh};
 use crate::Pose;
+use crate::vector::{cross, dot};
 
 /// A violated invariant of [`TriMesh`].
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

@@ -5,7 +5,7 @@ use std::io::{Error, ErrorKind, Result, Write};
 use std::ops::Range;
 
 use super::TriMesh;
-use super::builder::{cross, sub};
+use crate::vector::{cross, norm, sub};
 
 /// Writes all triangles as binary STL with face normals. Vertex normals, texture coordinates, submeshes and materials
 /// are lost.
@@ -23,7 +23,7 @@ pub fn write_binary_stl(mesh: &TriMesh, mut out: impl Write) -> Result<()> {
         let corners = triangle.map(|i| mesh.positions[i as usize]);
         let [a, b, c] = corners.map(|p| p.map(f64::from));
         let n = cross(sub(b, a), sub(c, a));
-        let length = (n[0] * n[0] + n[1] * n[1] + n[2] * n[2]).sqrt();
+        let length = norm(n);
         let normal = n.map(|x| if length > 0.0 { (x / length) as f32 } else { 0.0 });
         for x in std::iter::once(normal).chain(corners).flatten() {
             buffer.extend(x.to_le_bytes());

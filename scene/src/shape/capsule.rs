@@ -1,12 +1,12 @@
 //! A capsule.
 
 use super::area_sampling::AreaSampling;
-use super::closed_form::{ClosedForm, HullPart, Intersection, norm};
+use super::closed_form::{ClosedForm, HullPart, Intersection};
 use super::interval::{Interval, cylinder_interval, slab_interval, sphere_interval};
 use super::revolution::{arc, revolve};
 use crate::Ray;
 use crate::mesh::TriMesh;
-use crate::vector::{V3, add_scaled, normalize};
+use crate::vector::{V3, add_scaled, norm, normalize};
 
 /// A capsule centered at the origin: a cylinder along z with a hemisphere at each end.
 #[derive(Clone, Copy, Debug, PartialEq)]

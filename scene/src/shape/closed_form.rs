@@ -77,8 +77,3 @@ pub trait ClosedFormVisitor {
     /// Runs the operation on a shape.
     fn visit<T: ClosedForm>(self, shape: &T) -> Self::Output;
 }
-
-/// Length of a vector.
-pub(super) fn norm(a: V3) -> f64 {
-    a.iter().map(|x| x * x).sum::<f64>().sqrt()
-}

@@ -1,22 +1,11 @@
 //! Normals per corner: smooth across small angles, sharp across creases.
 
 use crate::mesh::TriMesh;
+use crate::vector::{cross, dot, norm, sub};
 use std::collections::HashMap;
 
-pub(super) fn sub(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
-    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
-}
-
-pub(super) fn dot(a: [f32; 3], b: [f32; 3]) -> f32 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
-pub(super) fn cross(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-}
-
 pub(super) fn unit(a: [f32; 3]) -> Option<[f32; 3]> {
-    let length = dot(a, a).sqrt();
+    let length = norm(a);
     (length > 0.0 && length.is_finite()).then(|| a.map(|x| x / length))
 }
 

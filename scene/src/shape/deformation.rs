@@ -1,7 +1,7 @@
 //! Vertex maps of meshes with moving vertices.
 
 use super::RenderMesh;
-use super::crease::{cross, dot, sub};
+use crate::vector::{add, cross, norm, sub};
 
 /// Vertex maps of a deformable mesh.
 #[derive(Debug, Default)]
@@ -46,12 +46,11 @@ pub fn smooth_normals(positions: &[[f32; 3]], triangles: &[[u32; 3]], normals: &
         let [a, b, c] = triangle.map(|i| positions[i as usize]);
         let doubled = cross(sub(b, a), sub(c, a));
         for &i in triangle {
-            let sum = &mut normals[i as usize];
-            *sum = [0, 1, 2].map(|k| sum[k] + doubled[k]);
+            normals[i as usize] = add(normals[i as usize], doubled);
         }
     }
     for normal in normals {
-        let length = dot(*normal, *normal).sqrt();
+        let length = norm(*normal);
         *normal = if length > 0.0 && length.is_finite() { normal.map(|x| x / length) } else { [0.0; 3] };
     }
 }

@@ -1,12 +1,12 @@
 //! An ellipsoid.
 
 use super::area_sampling::AreaSampling;
-use super::closed_form::{ClosedForm, HullPart, Intersection, norm};
+use super::closed_form::{ClosedForm, HullPart, Intersection};
 use super::interval::sphere_interval;
 use super::sphere::Sphere;
 use crate::Ray;
 use crate::mesh::TriMesh;
-use crate::vector::{V3, add_scaled, normalize, to_f64};
+use crate::vector::{V3, add_scaled, norm, normalize, to_f64};
 
 /// An ellipsoid centered at the origin, with its axes along x, y and z.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,9 +1,10 @@
 //! Triangles prepared for rendering: normals, clusters, bounds, levels of detail.
 
-use super::crease::{corner_normals, dot, face_normals, sub, unit, weld};
+use super::crease::{corner_normals, face_normals, unit, weld};
 use super::deformation::Deformation;
 use super::lod::{self, LodLevel};
 use crate::mesh::{Submesh, TriMesh};
+use crate::vector::{dot, sub};
 use std::collections::HashMap;
 use std::ops::Range;
 use std::sync::{Arc, OnceLock};

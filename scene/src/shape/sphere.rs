@@ -1,14 +1,14 @@
 //! A sphere.
 
 use super::area_sampling::{AreaSampling, SurfacePoint};
-use super::closed_form::{ClosedForm, HullPart, Intersection, norm};
+use super::closed_form::{ClosedForm, HullPart, Intersection};
 use super::interval::sphere_interval;
 use super::revolution::{arc, revolve};
 use crate::Ray;
 use crate::basis::OrthonormalBasis;
 use crate::mesh::TriMesh;
 use crate::sampling::cos_sin_turns;
-use crate::vector::{V3, add_scaled, dot, normalize, scale};
+use crate::vector::{V3, add_scaled, dot, norm, normalize, scale};
 use std::f64::consts::PI;
 
 /// A sphere centered at the origin.

@@ -1,7 +1,6 @@
 //! Tests of properties that all shapes share.
-use super::closed_form::norm;
 use super::*;
-use crate::vector::{add_scaled, cross, dot, sub};
+use crate::vector::{add_scaled, cross, dot, norm, sub};
 
 fn all() -> Vec<Shape> {
     let tetrahedron = Sphere { radius: 0.3 }.tessellate(12);
@@ -123,9 +122,9 @@ fn clusters() {
                 let lane = c.first_vertex as usize + *corner as usize;
                 let p = [0, 1, 2].map(|a| drawn.cluster_positions()[a][lane]);
                 assert_eq!(p, drawn.positions()[i as usize]);
-                let d = crease::sub(p, c.center);
-                assert!(crease::dot(d, d).sqrt() <= c.radius);
-                assert!(crease::dot(drawn.normals()[i as usize], p) > 0.99, "smooth");
+                let d = crate::vector::sub(p, c.center);
+                assert!(crate::vector::dot(d, d).sqrt() <= c.radius);
+                assert!(crate::vector::dot(drawn.normals()[i as usize], p) > 0.99, "smooth");
             }
         }
     }
@@ -168,7 +167,7 @@ fn corner_normals() {
                     let (mut sum, mut left_out) = ([0.0f32; 3], false);
                     for (other, around) in mesh.triangles.iter().enumerate() {
                         for corner in (0..3).filter(|&corner| welded[around[corner] as usize] == welded[i as usize]) {
-                            if crease::dot(faces[other], faces[k]) >= limit {
+                            if crate::vector::dot(faces[other], faces[k]) >= limit {
                                 let w = crease::angles(&mesh, around)[corner];
                                 sum = [0, 1, 2].map(|a| sum[a] + w * faces[other][a]);
                             } else {

@@ -1,6 +1,7 @@
 //! The star of a vertex (the triangles around it), and the effect of a collapse onto a neighbor.
 
 use super::simplify::Surface;
+use crate::vector::{V3, cross, dot, norm, sub};
 
 /// Largest number of triangles around a vertex that may collapse.
 pub(super) const MAX_VALENCE: usize = 32;
@@ -8,20 +9,6 @@ pub(super) const MAX_VALENCE: usize = 32;
 const MIN_NORMAL_COSINE: f32 = 0.766;
 /// Sine of the angle below which lines count as parallel and triangles as degenerate: 53 bits do not resolve them.
 const PARALLEL_SINE: f64 = 1e-8;
-
-type V = [f64; 3];
-
-fn sub(a: V, b: V) -> V {
-    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
-}
-
-fn dot(a: V, b: V) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
-fn cross(a: V, b: V) -> V {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-}
 
 /// Twice the signed area between two vectors.
 fn area(a: [f64; 2], b: [f64; 2]) -> f64 {
@@ -36,12 +23,12 @@ pub(super) struct Star {
     pub(super) triangles: [(u32, u8); MAX_VALENCE],
     pub(super) ring: [u32; MAX_VALENCE],
     /// Vectors from the vertex to the ring.
-    to: [V; MAX_VALENCE],
+    to: [V3; MAX_VALENCE],
     /// Projections of these vectors along the mean normal: right and up.
     flat: [[f64; 2]; MAX_VALENCE],
     /// Heights of the ring along the mean normal.
     height: [f64; MAX_VALENCE],
-    normal: V,
+    normal: V3,
     /// Sum over the triangles of area times n nᵀ, which gives the distances of points from their planes.
     quadric: [f64; 6],
 }
@@ -68,11 +55,11 @@ pub(super) struct Fan {
     /// Corner of the neighbor in each triangle, which selects one of its normals.
     pub(super) corner: [u32; MAX_VALENCE],
     /// The ring, counted from that neighbor: vectors from the vertex, their projections along the mean normal, heights.
-    to: [V; MAX_VALENCE],
+    to: [V3; MAX_VALENCE],
     flat: [[f64; 2]; MAX_VALENCE],
     height: [f64; MAX_VALENCE],
     /// Normals of the new triangles, of any length.
-    planes: [V; MAX_VALENCE],
+    planes: [V3; MAX_VALENCE],
     /// Largest difference in height over each new triangle.
     max_gap: [f64; MAX_VALENCE],
     /// Old triangles above or below each new triangle, as bits.
@@ -142,7 +129,7 @@ impl Star {
             *face = cross(self.to[i], self.to[next(i)]);
             sum = [0, 1, 2].map(|k| sum[k] + face[k]);
         }
-        let length = dot(sum, sum).sqrt();
+        let length = norm(sum);
         if length == 0.0 || !length.is_finite() {
             return false;
         }
@@ -163,7 +150,7 @@ impl Star {
             if dot(c, n) <= PARALLEL_SINE * longest {
                 return false;
             }
-            let k = 1.0 / dot(c, c).sqrt();
+            let k = 1.0 / norm(c);
             let products = [c[0] * c[0], c[1] * c[1], c[2] * c[2], c[0] * c[1], c[1] * c[2], c[2] * c[0]];
             self.quadric = std::array::from_fn(|q| self.quadric[q] + k * products[q]);
         }
@@ -312,14 +299,13 @@ impl Star {
         let m = self.count;
         let corner = |(triangle, corner): (u32, u8), step: u8| surface.corner(triangle, corner + step);
         let (first, last) = (corner(self.triangles[onto], 1), corner(self.triangles[(onto + m - 1) % m], 2));
-        let dot = |a: [f32; 3], b: [f32; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
         let normals = [surface.normal(first), surface.normal(last)];
         for j in 1..m - 1 {
             let old = self.triangles[if onto + j < m { onto + j } else { onto + j - m }];
             let had = surface.normal(corner(old, 0));
             let take_last = dot(had, normals[1]) > dot(had, normals[0]);
             let n = fan.planes[j];
-            let length = (n[0] * n[0] + n[1] * n[1] + n[2] * n[2]).sqrt();
+            let length = norm(n);
             let face = n.map(|x| (x / length) as f32);
             let kept =
                 [normals[usize::from(take_last)], surface.normal(corner(old, 1)), surface.normal(corner(old, 2))];

@@ -8,6 +8,7 @@ use super::{Scratch, Segment};
 use kinetoscope_mujoco::{Data, FlexArrays};
 use kinetoscope_scene::mesh::TriMesh;
 use kinetoscope_scene::shape::smooth_normals;
+use kinetoscope_scene::vector::{cross, norm, sub};
 use std::collections::HashMap;
 
 /// Flex of one dimension.
@@ -165,14 +166,13 @@ impl Cloth {
 /// Computes the mean of the unit normals of the triangles around each vertex, normalized to length 1.
 fn mean_normals(positions: &[[f32; 3]], triangles: &[[u32; 3]], normals: &mut [[f32; 3]]) {
     let unit = |v: [f64; 3]| {
-        let length = v.iter().map(|x| x * x).sum::<f64>().sqrt();
+        let length = norm(v);
         if length > 0.0 { v.map(|x| x / length) } else { [0.0; 3] }
     };
     normals.fill([0.0; 3]);
     for triangle in triangles {
         let [p, q, r] = triangle.map(|i| positions[i as usize].map(f64::from));
-        let [a, b] = [q, r].map(|to| [0, 1, 2].map(|k| to[k] - p[k]));
-        let normal = unit([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]);
+        let normal = unit(cross(sub(q, p), sub(r, p)));
         for &i in triangle {
             let sum = &mut normals[i as usize];
             *sum = [0, 1, 2].map(|k| sum[k] + normal[k] as f32);
