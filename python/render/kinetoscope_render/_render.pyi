@@ -1,13 +1,16 @@
-from typing import Any
+from typing import Any, final
 
 import numpy as np
 import numpy.typing as npt
 
+__all__ = ["FrameList", "__version__"]
+
 __version__: str
 
+@final
 class FrameList:
-    def __init__(
-        self,
+    def __new__(
+        cls,
         arrays: dict[str, npt.NDArray[Any]],
         geom_fields: dict[str, int],
         light_fields: dict[str, int],
@@ -17,7 +20,7 @@ class FrameList:
         shadows: list[float],
         decor_casts: bool,
         quality: list[int],
-    ) -> None: ...
+    ) -> FrameList: ...
     def reload(self, arrays: dict[str, npt.NDArray[Any]]) -> None: ...
     def omitted(self) -> list[str]: ...
     def __len__(self) -> int: ...

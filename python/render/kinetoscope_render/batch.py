@@ -94,7 +94,7 @@ class BatchRenderer:
                 capture.update(data, which, scene_option)
                 capture.capture(self.height, self.width)
             if states:
-                capture.render(self.height, self.width, **buffers)
+                capture.render(self.height, self.width, buffers)
         for name, buffer in buffers.items():
             given = outs.get(name)
             if given is not None and given is not buffer:

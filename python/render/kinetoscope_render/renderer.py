@@ -133,6 +133,8 @@ class Renderer:
         """
         capture = self._open()
         size = (self._height, self._width)
+        shape: tuple[int, ...]
+        dtype: Any
         if self._depth_rendering:
             channel, shape, dtype = "depth", size, np.float32
         elif self._segmentation_rendering:
@@ -143,7 +145,7 @@ class Renderer:
         with capture.exclusive():
             capture.frames.clear()
             capture.capture(self._height, self._width)
-            capture.render(self._height, self._width, **{channel: buffer})
+            capture.render(self._height, self._width, {channel: buffer})
         if out is None or out is buffer:
             return buffer
         np.copyto(out, buffer, casting="unsafe")

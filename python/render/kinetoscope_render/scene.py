@@ -243,19 +243,22 @@ class SceneCapture:
             effects, [width, height], self._soft(),
         )
 
-    def render(self, height: int, width: int, *, surfaces_of_color: bool = False, **images: np.ndarray) -> None:
+    def render(
+        self, height: int, width: int, images: dict[str, np.ndarray], *, surfaces_of_color: bool = False
+    ) -> None:
         """Renders the captured scenes.
 
         Args:
             height: Height of the images [pixels].
             width: Width of the images [pixels].
-            surfaces_of_color: True if depth and normals show geoms without a segmentation id too.
             images: Contiguous arrays for the images of all scenes, by channel of `FrameList.render`.
+            surfaces_of_color: True if depth and normals show geoms without a segmentation id too.
         """
         source = self._colors.source if "rgb" in images else None
         if source is not None:
             # Flags of the scene replace the colors.
-            rgb = images.pop("rgb")
+            rgb = images["rgb"]
+            images = {name: image for name, image in images.items() if name != "rgb"}
             name, dtype = source
             shown = np.empty(rgb.size // 3, dtype)
             self._render_views(height, width, not self._colors.is_segments, {name: shown})

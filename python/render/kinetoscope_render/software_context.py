@@ -68,8 +68,9 @@ def _for_our_context(function: Callable[..., None]) -> Callable[..., None]:
     def dispatch(*args: Any, **kwargs: Any) -> None:
         is_ours = any(isinstance(value, MjrContext) for value in (*args, *kwargs.values()))
         if is_ours or original is None:
-            return function(*args, **kwargs)
-        return original(*args, **kwargs)
+            function(*args, **kwargs)
+        else:
+            original(*args, **kwargs)
 
     return dispatch
 
@@ -111,7 +112,7 @@ def mjr_readPixels(rgb: Any, depth: Any, viewport: Any, con: MjrContext) -> None
         return
     # Without the segmentation flag, depth shows all that color shows.
     with capture.exclusive():
-        capture.render(height, width, surfaces_of_color=not colors.is_segments, **wanted)
+        capture.render(height, width, wanted, surfaces_of_color=not colors.is_segments)
     if rgb is not None:
         _store(rgb, wanted["rgb"][::-1], "rgb")
     if depth is not None:

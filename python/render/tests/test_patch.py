@@ -38,9 +38,11 @@ def read_pixels(model, data, flags=()):
     camera.type, camera.fixedcamid = int(mujoco.mjtCamera.mjCAMERA_FIXED), 0
     con = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_150)
     mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, con)
-    mujoco.mjv_updateScene(
-        model, data, mujoco.MjvOption(), mujoco.MjvPerturb(), camera, int(mujoco.mjtCatBit.mjCAT_ALL), scene
-    )
+    # Twice: MuJoCo moves infinite planes below the camera of the update before.
+    for _ in range(2):
+        mujoco.mjv_updateScene(
+            model, data, mujoco.MjvOption(), mujoco.MjvPerturb(), camera, int(mujoco.mjtCatBit.mjCAT_ALL), scene
+        )
     for flag in flags:
         scene.flags[int(flag)] = 1
     rect = mujoco.MjrRect(0, 0, 80, 60)
