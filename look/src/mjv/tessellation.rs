@@ -236,7 +236,7 @@ mod tests {
         }
     }
 
-    /// Grids of planes: the lines of MuJoCo's `makePlane`, computed by hand.
+    /// Grids of planes, with the lines that `makePlane` of MuJoCo has, computed by hand.
     #[test]
     fn planes() {
         let lines = |half: [f32; 2], grid: PlaneGrid| grid.lines(&Plane { half }).map(|lines| lines.all());

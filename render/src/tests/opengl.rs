@@ -289,10 +289,10 @@ fn culled_backs() {
 }
 
 /// Light is computed at the corners of polygons and interpolated: between the corners (0, 0), (2, 0) and (0, 2) of a floor,
-/// below a lamp at (0, 0, 3).
+/// below a light at (0, 0, 3).
 #[test]
 fn light_at_corners() {
-    let lamp = Light {
+    let light = Light {
         kind: LightKind::Point,
         position: [0.0, 0.0, 3.0],
         attenuation: [1.0, 0.0, 0.0],
@@ -303,7 +303,7 @@ fn light_at_corners() {
     let draw = |tessellation: Option<Tessellation>| {
         let rules = OpenGlRules { tessellation, ..RULES };
         let far = (plate(), matte([0.5; 3]), translation(-20.0, 0.0, 1.0));
-        let mut frame = floor_and(far, matte([0.5; 3]), Some(rules), vec![lamp]);
+        let mut frame = floor_and(far, matte([0.5; 3]), Some(rules), vec![light]);
         frame.scene.set_plane_lines(0, lines);
         frame.draw()
     };
@@ -323,7 +323,7 @@ fn light_at_corners() {
 /// triangles, which has another code.
 #[test]
 fn corners_of_meshes() {
-    let lamp = Light {
+    let light = Light {
         kind: LightKind::Point,
         position: [1.0, 0.5, 2.0],
         attenuation: [0.5, 0.2, 0.1],
@@ -336,7 +336,7 @@ fn corners_of_meshes() {
     let draw = |shape: Shape, quality: Tessellation| {
         let rules = OpenGlRules { tessellation: Some(quality), ..RULES };
         let shiny = Material { specular: 0.8, shininess: 0.2, ..matte([0.5; 3]) };
-        floor_and((shape, shiny, translation(0.0, 0.0, 0.5)), matte([0.5; 3]), Some(rules), vec![lamp]).draw()
+        floor_and((shape, shiny, translation(0.0, 0.0, 0.5)), matte([0.5; 3]), Some(rules), vec![light]).draw()
     };
     // The upper face, split like OpenGL splits it.
     let corner = |x: f32, y: f32| [x * half[0], y * half[1], half[2]];
