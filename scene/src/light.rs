@@ -3,6 +3,8 @@
 //! Light colors are linear intensities, except in [`LightingSpace::Display`]. Colors of surfaces, skies and haze are
 //! display colors (sRGB).
 
+use crate::polygons::Tessellation;
+
 /// Type of a light.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum LightKind {
@@ -128,12 +130,21 @@ impl Default for Headlight {
 /// - A point is either lit or in the shadow: edges of shadows are sharp.
 /// - Samples, transparent surfaces and haze are mixed as display colors; haze increases linearly with the depth.
 /// - The exposure compensation multiplies display colors.
+/// - With `tessellation`, light is computed at the corners of the triangles of meshes, and of polygons that approximate
+///   other shapes. Visibility and depth are those of the shapes.
+/// - With `culls_backs`, the rasterizer leaves out the backs of surfaces, except those of markers.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OpenGlRules {
     /// Half the side of the square around a directional light, across its direction, in which it casts shadows \[m\].
     pub shadow_clip: f32,
     /// Fraction of a spot's cutoff angle in which it casts shadows.
     pub shadow_scale: f32,
+    /// True if backs of surfaces are invisible: a camera inside of a solid looks through it.
+    pub culls_backs: bool,
+    /// True if the color of a transparent surface, times its opacity, is added to the color behind it.
+    pub is_additive: bool,
+    /// Polygons at whose corners light is computed, to be interpolated between them; `None` to compute it at every pixel.
+    pub tessellation: Option<Tessellation>,
 }
 
 impl OpenGlRules {

@@ -3,6 +3,7 @@
 use crate::Pose;
 use crate::light::{Haze, Headlight, Hemisphere, HorizonHaze, Light, LightingSpace, OpenGlRules, Sky};
 use crate::material::{Material, Texture, TextureKind};
+use crate::polygons::PlaneLines;
 use crate::shape::Shape;
 use std::sync::Arc;
 
@@ -113,6 +114,7 @@ pub struct RenderScene {
     linear_colors: Vec<[f32; 3]>,
     texture_scales: Vec<[f32; 3]>,
     texture_offsets: Vec<[f32; 2]>,
+    plane_lines: Vec<[PlaneLines; 2]>,
     /// Lights of the scene, used if the renderer is given no others. Renderers use the first 16 active lights.
     pub lights: Vec<Light>,
     /// Headlight of every camera.
@@ -201,7 +203,8 @@ impl RenderScene {
         };
         let linear_colors = instances.iter().map(linear).collect();
         let (texture_scales, texture_offsets) = instances.iter().map(Instance::texture_map).unzip();
-        Ok(Self { linear_colors, texture_scales, texture_offsets, instances, first_ids, ..Self::empty() })
+        let plane_lines = vec![[PlaneLines::default(); 2]; instances.len()];
+        Ok(Self { linear_colors, texture_scales, texture_offsets, plane_lines, instances, first_ids, ..Self::empty() })
     }
 
     /// Creates a scene of other instances with the lights and the background of this one.
@@ -222,6 +225,7 @@ impl RenderScene {
             linear_colors: Vec::new(),
             texture_scales: Vec::new(),
             texture_offsets: Vec::new(),
+            plane_lines: Vec::new(),
             instances: Vec::new(),
             first_ids: vec![0],
             lights: vec![Light::default()],
@@ -234,6 +238,21 @@ impl RenderScene {
             haze: None,
             horizon: None,
         }
+    }
+
+    /// Sets the polygons of an instance that is a plane, for [`OpenGlRules::tessellation`].
+    ///
+    /// # Panics
+    ///
+    /// `index` is out of range.
+    #[track_caller]
+    pub fn set_plane_lines(&mut self, index: usize, lines: [PlaneLines; 2]) {
+        self.plane_lines[index] = lines;
+    }
+
+    /// Polygons of each instance that is a plane, see [`set_plane_lines`](Self::set_plane_lines).
+    pub fn plane_lines(&self) -> &[[PlaneLines; 2]] {
+        &self.plane_lines
     }
 
     /// Replaces the shape of an instance by one of the same kind, and shows or hides the instance. Sizes are not

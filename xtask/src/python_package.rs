@@ -16,6 +16,10 @@ const PACKAGE: &str = "python/render";
 /// Beginning of the names of its wheels.
 const PREFIX: &str = "kinetoscope_render-";
 
+/// End of the names of wheels, and of source distributions.
+const WHEEL: &str = ".whl";
+const SDIST: &str = ".tar.gz";
+
 /// The program that builds wheels from Rust.
 const MATURIN: &str = "maturin==1.16.0";
 
@@ -48,15 +52,16 @@ const TESTED: [(&str, &str); 3] = [("2.3.7", "numpy<2"), ("3.3.7", "numpy>=2"), 
 
 #[derive(Debug, clap::Args)]
 pub(crate) struct WheelArgs {
-    /// Also write a source distribution of kinetoscope-render
+    /// Also install the source distribution into a new virtual environment, which compiles it, and render with it
     #[arg(long)]
-    sdist: bool,
+    install_sdist: bool,
     /// Link with glibc 2.28, for other Linux machines; installs zig into the target folder
     #[arg(long)]
     portable: bool,
 }
 
-/// `cargo xtask wheel`: builds the wheels of both packages into `wheels` of the target folder and prints their paths.
+/// `cargo xtask wheel`: builds the wheels of both packages and the source distribution of kinetoscope-render into `wheels`
+/// of the target folder, and prints their paths.
 ///
 /// # Errors
 /// Python cannot be set up, a package does not compile, or a wheel contains paths of this machine or, if it is
@@ -68,12 +73,29 @@ pub(crate) fn run(repo: &Repo, args: &WheelArgs) -> XtaskResult {
         check(repo, &wheel, profile)?;
         println!("{}", wheel.display());
     }
-    if args.sdist {
-        let maturin = maturin(repo)?;
-        let package = repo.root.join(PACKAGE);
-        Cmd::new(maturin).args(["sdist", "--out"]).arg(wheels(repo)).current_dir(package).run()?;
-    }
-    Ok(())
+    let sdist = source_distribution(repo)?;
+    println!("{}", sdist.display());
+    if args.install_sdist { install_sdist(repo, &sdist) } else { Ok(()) }
+}
+
+/// Builds the source distribution and returns its path.
+fn source_distribution(repo: &Repo) -> XtaskResult<PathBuf> {
+    let dir = wheels(repo);
+    remove_files(&dir, PREFIX, SDIST)?;
+    let build = Cmd::new(maturin(repo)?).env("CARGO_TARGET_DIR", &repo.target);
+    build.args(["sdist", "--out"]).arg(&dir).current_dir(repo.root.join(PACKAGE)).run()?;
+    let message = || Failure::new(format!("maturin built no source distribution in {}", dir.display()));
+    built_files(&dir, PREFIX, SDIST).into_iter().next().ok_or_else(message)
+}
+
+/// Installs a source distribution beside `mujoco` in a virtual environment of its own, and renders an image.
+fn install_sdist(repo: &Repo, sdist: &Path) -> XtaskResult {
+    let venv = repo.target.join("sdist-venv");
+    create(&venv, &[&format!("mujoco=={}", wheel::PYTHON_VERSION)])?;
+    let python = venv.join("bin/python");
+    let install = Cmd::new(&python).args(["-m", "pip", "install", "--no-input", "--disable-pip-version-check"]);
+    install.arg(sdist).env("CARGO_TARGET_DIR", repo.target.join("sdist-build")).run()?;
+    Cmd::new(&python).args(["-m", "kinetoscope_render", "doctor"]).current_dir(&venv).run()
 }
 
 /// The stage `python` of CI: builds the wheel, installs it beside each tested `mujoco`, and runs the tests.
@@ -111,13 +133,15 @@ pub(crate) fn test(repo: &Repo) -> XtaskResult {
 /// The folder with the packages of [`MODELS`], below the target folder.
 fn models(repo: &Repo) -> XtaskResult<PathBuf> {
     let folder = repo.target.join("python-render-models");
-    // Named after its content: another list of packages is another folder.
+    // A file named after the content of the folder: another list of packages replaces the folder.
     let done = folder.join(MODELS.join(" "));
     if !done.exists() {
+        if folder.exists() {
+            fs::remove_dir_all(&folder).map_err(|e| Failure::new(format!("{}: {e}", folder.display())))?;
+        }
         setup::try_to_have(Requirement::Pip);
         let pip = wheel::pip().ok_or_else(|| Failure::new("models are downloaded with pip, which is missing"))?;
-        let options =
-            ["--no-input", "--disable-pip-version-check", "--quiet", "--no-deps", "--only-binary=:all:", "--upgrade"];
+        let options = ["--no-input", "--disable-pip-version-check", "--quiet", "--no-deps", "--only-binary=:all:"];
         let install = Cmd::new(pip[0]).args(&pip[1..]).arg("install").args(options).arg("--target").arg(&folder);
         install.args(MODELS).run()?;
         fs::write(&done, "").map_err(|e| Failure::new(format!("{}: {e}", done.display())))?;
@@ -211,12 +235,16 @@ fn check(repo: &Repo, wheel: &Path, profile: BuildProfile) -> XtaskResult {
 /// There is no such wheel.
 pub(crate) fn built_wheel(dir: &Path, prefix: &str) -> XtaskResult<PathBuf> {
     let message = || Failure::new(format!("maturin built no wheel in {}", dir.display()));
-    built_wheels(dir, prefix).into_iter().next().ok_or_else(message)
+    built_files(dir, prefix, WHEEL).into_iter().next().ok_or_else(message)
 }
 
 /// Removes wheels of earlier builds whose names begin with `prefix`.
 pub(crate) fn remove_wheels(dir: &Path, prefix: &str) -> XtaskResult {
-    for old in built_wheels(dir, prefix) {
+    remove_files(dir, prefix, WHEEL)
+}
+
+fn remove_files(dir: &Path, prefix: &str, suffix: &str) -> XtaskResult {
+    for old in built_files(dir, prefix, suffix) {
         fs::remove_file(&old).map_err(|e| Failure::new(format!("{}: {e}", old.display())))?;
     }
     Ok(())
@@ -227,11 +255,11 @@ pub(crate) fn wheels(repo: &Repo) -> PathBuf {
     repo.target.join("wheels")
 }
 
-/// Wheels of a package in a folder that has other wheels too.
-fn built_wheels(dir: &Path, prefix: &str) -> Vec<PathBuf> {
+/// Files of a package in a folder that has files of others too.
+fn built_files(dir: &Path, prefix: &str, suffix: &str) -> Vec<PathBuf> {
     let is_ours = |path: &PathBuf| {
         let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
-        name.starts_with(prefix) && name.ends_with(".whl")
+        name.starts_with(prefix) && name.ends_with(suffix)
     };
     fs::read_dir(dir).into_iter().flatten().flatten().map(|entry| entry.path()).filter(is_ours).collect()
 }
@@ -259,15 +287,16 @@ pub(crate) fn maturin(repo: &Repo) -> XtaskResult<PathBuf> {
     if is_ready() { Ok(program) } else { Err(Failure::new(format!("{MATURIN} does not start"))) }
 }
 
-/// A Python with a version of `mujoco`, its OpenGL bindings and pytest, below the target folder.
+/// A Python with a version of `mujoco`, its OpenGL bindings, mypy and pytest, below the target folder.
 fn environment(repo: &Repo, version: &str, numpy: &str) -> XtaskResult<PathBuf> {
     let venv = repo.target.join(format!("python-mujoco-{version}"));
     let python = venv.join("bin/python");
-    let check = format!("import absl, mujoco, numpy, OpenGL, pytest; assert mujoco.__version__ == '{version}'");
+    let check = format!("import absl, mujoco, mypy, numpy, OpenGL, pytest; assert mujoco.__version__ == '{version}'");
     let is_ready = || Cmd::new(&python).args(["-c", &check]).quiet().succeeds();
     if !is_ready() {
         let mujoco = format!("mujoco=={version}");
-        let packages = [&[mujoco.as_str(), numpy, "absl-py==2.5.1", "pytest==9.2.0"], OPENGL.packages].concat();
+        let tools = ["absl-py==2.5.1", "mypy==2.4.1", "pytest==9.2.0"];
+        let packages = [&[mujoco.as_str(), numpy], &tools[..], OPENGL.packages].concat();
         create(&venv, &packages)?;
     }
     if is_ready() { Ok(python) } else { Err(Failure::new(format!("mujoco {version} cannot be imported"))) }
@@ -291,8 +320,9 @@ mod tests {
         for name in ["mujoco_core-4.0.1-cp311-any.whl", "kinetoscope_render-0.1.0.tar.gz", "kinetoscope_render-1.whl"] {
             wheel::tests::write(&dir.path().join(name), "");
         }
-        assert_eq!(built_wheels(dir.path(), PREFIX), [dir.path().join("kinetoscope_render-1.whl")]);
-        assert!(built_wheels(&dir.path().join("missing"), PREFIX).is_empty());
+        assert_eq!(built_files(dir.path(), PREFIX, WHEEL), [dir.path().join("kinetoscope_render-1.whl")]);
+        assert_eq!(built_files(dir.path(), PREFIX, SDIST), [dir.path().join("kinetoscope_render-0.1.0.tar.gz")]);
+        assert!(built_files(&dir.path().join("missing"), PREFIX, WHEEL).is_empty());
     }
 
     #[test]

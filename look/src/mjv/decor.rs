@@ -22,6 +22,8 @@ pub struct LineView {
     pub width: f32,
     /// Smallest visible depth \[m\].
     pub near: f32,
+    /// Largest visible depth \[m\].
+    pub far: f32,
     /// True for an orthographic camera.
     pub parallel: bool,
 }
@@ -128,14 +130,25 @@ pub(super) fn strips(
     view: &LineView,
     place: impl Fn([f32; 3]) -> [f32; 3],
 ) -> [Vec<[f32; 3]>; 2] {
-    let wide = |v: [f32; 3]| v.map(f64::from);
-    let (eye, forward) = (wide(view.position), wide(view.forward));
     // MuJoCo's lines are as wide as the first number of their size, and the edges of boxes are 1.5 wide.
-    let width = f64::from(view.width) * if decor == Decor::Line { f64::from(size[0]) } else { 1.5 };
-    let near = 1.001 * f64::from(view.near);
+    let width = if decor == Decor::Line { size[0] } else { 1.5 };
     let (mut positions, mut normals) = (Vec::new(), Vec::new());
-    for [a, b] in decor.ends(size) {
-        let [mut a, mut b] = [a, b].map(|point| sub(wide(place(point)), eye));
+    for ends in decor.ends(size) {
+        positions.extend(view.strip(ends.map(&place), width));
+        normals.extend([view.forward.map(|x| -x); 4]);
+    }
+    [positions, normals]
+}
+
+impl LineView {
+    /// Corners of the strip that shows a line of this width \[pixels\]: two at each end, in the order of `ends`. Behind the
+    /// near plane, a strip has no extent.
+    pub(super) fn strip(&self, ends: [[f32; 3]; 2], width: f32) -> [[f32; 3]; 4] {
+        let wide = |v: [f32; 3]| v.map(f64::from);
+        let (eye, forward) = (wide(self.position), wide(self.forward));
+        let width = f64::from(self.width) * f64::from(width);
+        let near = 1.001 * f64::from(self.near);
+        let [mut a, mut b] = ends.map(|point| sub(wide(point), eye));
         let depth = |p: [f64; 3]| dot(p, forward);
         let cut = |from: [f64; 3], to: [f64; 3]| {
             let k = (near - depth(from)) / (depth(to) - depth(from));
@@ -147,20 +160,17 @@ pub(super) fn strips(
             [false, true] => b = cut(b, a),
             [false, false] => {}
         }
-        let across = if view.parallel { cross(forward, sub(b, a)) } else { cross(a, b) };
+        let across = if self.parallel { cross(forward, sub(b, a)) } else { cross(a, b) };
         let length = dot(across, across).sqrt();
         let side = |p: [f64; 3]| {
-            let half = 0.5 * width * if view.parallel { 1.0 } else { depth(p).max(near) };
+            let half = 0.5 * width * if self.parallel { 1.0 } else { depth(p).max(near) };
             if length > 0.0 { scale(across, half / length) } else { [0.0; 3] }
         };
-        let corners = [(a, -1.0), (a, 1.0), (b, 1.0), (b, -1.0)];
-        for (end, sign) in corners {
+        [(a, -1.0), (a, 1.0), (b, 1.0), (b, -1.0)].map(|(end, sign)| {
             let offset = side(end);
-            positions.push([0, 1, 2].map(|i| (eye[i] + end[i] + sign * offset[i]) as f32));
-            normals.push(view.forward.map(|x| -x));
-        }
+            [0, 1, 2].map(|i| (eye[i] + end[i] + sign * offset[i]) as f32)
+        })
     }
-    [positions, normals]
 }
 
 /// Triangle mesh of an arrow along z, with the semi-axes `radii` along x and y.

@@ -15,6 +15,17 @@ pub struct Background {
     pub fog: Option<Haze>,
 }
 
+/// Flags of a scene that change how its geoms are drawn.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct DrawFlags {
+    /// True if the backs of surfaces are invisible (`mjRND_CULL_FACE`).
+    pub culls_backs: bool,
+    /// True if transparent geoms are added to the color behind them (`mjRND_ADDITIVE`).
+    pub is_additive: bool,
+    /// True if the edges of polygons are drawn instead of surfaces (`mjRND_WIREFRAME`).
+    pub is_wireframe: bool,
+}
+
 /// Instances, poses and lights of one update. The mask id of an instance is the index of its geom plus 1.
 #[derive(Clone, Debug)]
 pub struct MjvFrame {

@@ -12,13 +12,15 @@ mod frame;
 mod layout;
 mod reader;
 mod soft;
+mod tessellation;
 #[cfg(test)]
 mod tests;
 mod texture_rule;
+mod wireframe;
 
 pub use camera::{MjvCamera, MjvCameraError};
 pub use decor::LineView;
-pub use frame::{Background, MjvFrame, MjvObject};
+pub use frame::{Background, DrawFlags, MjvFrame, MjvObject};
 pub use layout::{DecorTypes, GeomLayout, LayoutError, LightLayout, SoftTypes};
 pub use reader::MjvReader;
 pub use soft::{MjvMemory, SkinFaces};

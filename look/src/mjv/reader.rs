@@ -1,11 +1,15 @@
 //! Conversion of the memory of `mjvGeom` and `mjvLight` to scenes.
 
 use super::decor::{Decor, line_mesh, strips};
-use super::frame::{Background, MjvFrame, MjvObject};
+use super::frame::{Background, DrawFlags, MjvFrame, MjvObject};
 use super::layout::{GeomLayout, LayoutError, LightLayout, floats, int};
 use super::soft::{MjvMemory, SkinFaces, SoftBody};
+use super::tessellation::{Facets, PlaneGrid};
 use super::texture_rule::{TextureRule, moved_texture, plane_shift, wrapped_mesh};
-use crate::{GeomShapes, GeomType, LightType, ModelMaterials, VisualModel, first_skybox, scene_light, skybox};
+use super::wireframe::wire_mesh;
+use crate::{
+    GeomShapes, GeomType, LightType, ModelMaterials, VisualModel, first_skybox, scene_light, shape_from_size, skybox,
+};
 use kinetoscope_scene::shape::{Capsule, Mesh, RenderMesh, Shape};
 use kinetoscope_scene::{
     Headlight, Hemisphere, Instance, Light, LightingSpace, Marker, Material, OpenGlRules, PoseF32, RenderScene, Sky,
@@ -67,6 +71,7 @@ const MAX_WRAPPED: usize = 1000;
 struct LastScene {
     looks: Vec<GeomLook>,
     background: Background,
+    flags: DrawFlags,
     lights: usize,
     /// True if a light is active.
     is_lit: bool,
@@ -237,7 +242,8 @@ impl<M: VisualModel> MjvReader<M> {
         let is_lit = lights.iter().any(|light| light.active);
         let is_same = |last: &LastScene| {
             let same_lights = last.lights == lights.len() && last.is_lit == is_lit;
-            last.background == background && same_lights && last.looks == looks
+            let same_flags = last.background == background && last.flags == memory.flags;
+            same_flags && same_lights && last.looks == looks
         };
         let mut last = match last {
             Some(last) if is_same(&last) => last,
@@ -260,7 +266,8 @@ impl<M: VisualModel> MjvReader<M> {
             // Copied only if an earlier frame is still in use.
             for scene in std::iter::once(&mut last.scene).chain(&mut last.segment_scene) {
                 let scene = Arc::make_mut(scene);
-                for &(instance, body) in &last.soft {
+                // Wireframes are built for each frame.
+                for &(instance, body) in last.soft.iter().filter(|_| !memory.flags.is_wireframe) {
                     let [positions, normals] = body.vertices(&self.skins, memory);
                     if positions.iter().flatten().all(|x| x.is_finite()) && !positions.is_empty() {
                         scene.deform(instance, |mesh| mesh.deform(positions, normals));
@@ -285,7 +292,7 @@ impl<M: VisualModel> MjvReader<M> {
             lights,
             objects: std::iter::once(MjvObject::NONE).chain(rows().map(object)).collect(),
         };
-        self.last = Some(last);
+        self.last = Some(last).filter(|_| !memory.flags.is_wireframe);
         Ok(frame)
     }
 
@@ -311,7 +318,7 @@ impl<M: VisualModel> MjvReader<M> {
                     // Planes are visible from behind in MuJoCo's renderer, but transparent.
                     if let Some(back) = back {
                         let [r, g, b, _] = back.material.rgba;
-                        let opacity = drawn_twice(BACK_OF_PLANE * f32::from_bits(look.rgba[3]));
+                        let opacity = memory.flags.opacity(BACK_OF_PLANE * f32::from_bits(look.rgba[3]));
                         let material = Material { reflectance: 0.0, rgba: [r, g, b, opacity], ..back.material };
                         instances.push(Instance { material, group: OpenGlRules::BACK_GROUP, ..back });
                         rows.push(InstanceRow { geom, is_back: true });
@@ -321,7 +328,8 @@ impl<M: VisualModel> MjvReader<M> {
             }
         }
         let hidden = |row: &InstanceRow| !looks[row.geom as usize].has_segment;
-        let segment_instances = rows.iter().any(hidden).then(|| {
+        let has_segment_scene = memory.flags.is_wireframe || rows.iter().any(hidden);
+        let segment_instances = has_segment_scene.then(|| {
             let hide = |(instance, row): (&Instance, &InstanceRow)| {
                 let visible = instance.visible && !hidden(row);
                 Instance { visible, ..instance.clone() }
@@ -329,23 +337,40 @@ impl<M: VisualModel> MjvReader<M> {
             instances.iter().zip(&rows).map(hide).collect::<Vec<_>>()
         });
         let scales = self.cube_scales(&instances, &rows, &looks);
+        let grids: Vec<_> = (0..)
+            .zip(instances.iter().zip(&rows))
+            .filter_map(|(index, (instance, row))| {
+                let Shape::Plane(plane) = &instance.shape else { return None };
+                Some((index, self.plane_grid(&looks[row.geom as usize], memory).lines(plane)))
+            })
+            .collect();
         let scaled = |mut scene: RenderScene| {
             for &(instance, scale) in &scales {
                 scene.set_texture_scale(instance, scale);
             }
+            for &(instance, lines) in &grids {
+                scene.set_plane_lines(instance, lines);
+            }
             scene
         };
-        let scene = self.scene(instances, background, lights).map(scaled).unwrap_or_else(|| {
+        let instances = if memory.flags.is_wireframe {
+            let wired = |(instance, row)| self.wired(instance, row, &looks, memory);
+            instances.into_iter().zip(&rows).map(wired).collect()
+        } else {
+            instances
+        };
+        let scene = self.scene(instances, background, lights, memory.flags).map(scaled).unwrap_or_else(|| {
             rows.clear();
             soft.clear();
             lines.clear();
             RenderScene::empty()
         });
         let segment_scene =
-            segment_instances.and_then(|instances| self.scene(instances, background, lights)).map(scaled);
+            segment_instances.and_then(|instances| self.scene(instances, background, lights, memory.flags)).map(scaled);
         LastScene {
             looks,
             background,
+            flags: memory.flags,
             lights: lights.len(),
             is_lit: lights.iter().any(|light| light.active),
             scene: Arc::new(scene),
@@ -353,6 +378,53 @@ impl<M: VisualModel> MjvReader<M> {
             rows,
             soft,
             lines,
+        }
+    }
+
+    /// Polygons of a geom that is a plane.
+    fn plane_grid(&self, look: &GeomLook, memory: &MjvMemory<'_>) -> PlaneGrid {
+        PlaneGrid {
+            spacing: (look.dataid >= 0).then(|| f32::from_bits(look.size[2])),
+            repeat: self.materials.get(look.matid).map_or([0.0; 2], |material| material.tex_repeat),
+            far: memory.lines.map_or(1.0, |view| view.far),
+            quality: self.rules.and_then(|rules| rules.tessellation).unwrap_or_default(),
+        }
+    }
+
+    /// An instance that shows the edges of the polygons of another one.
+    fn wired(&self, instance: Instance, row: &InstanceRow, looks: &[GeomLook], memory: &MjvMemory<'_>) -> Instance {
+        let look = &looks[row.geom as usize];
+        let Some(view) = memory.lines.filter(|_| look.decor.is_none_or(|decor| decor.lines() == 0)) else {
+            return instance;
+        };
+        let bytes = &memory.geoms[row.geom as usize * self.geoms.stride..];
+        let is_soft = look.soft.is_some();
+        let view = if is_soft { view } else { view.in_frame(&row.pose(bytes, &self.geoms)) };
+        let grid = self.plane_grid(look, memory);
+        // A textured shape may already be a mesh with texture coordinates.
+        let size = look.size.map(f32::from_bits);
+        let own = own_shape(look.kind, size);
+        let mut facets = match instance.mesh() {
+            Some(mesh) if own.is_none() => Facets::of_mesh(mesh),
+            _ => Facets::new(own.as_ref().unwrap_or(&instance.shape), &grid),
+        };
+        let is_flat = instance.material.texture.as_ref().is_some_and(|texture| texture.kind() == TextureKind::TwoD);
+        if is_flat && facets.uvs.is_none() {
+            let Ok(scene) = RenderScene::new(vec![instance.clone()]) else { return instance };
+            let ([scale], [offset]) = (scene.texture_scales(), scene.texture_offsets()) else { return instance };
+            let uv = |p: &[f32; 3]| [0, 1].map(|k| p[k] * scale[k] + offset[k]);
+            facets.uvs = Some(facets.positions.iter().map(uv).collect());
+        }
+        let group = if row.is_back { instance.group } else { Marker::GROUP };
+        match wire_mesh(&facets, &view, memory.flags.culls_backs && look.decor.is_none()) {
+            Some(mesh) => Instance {
+                shape: Mesh { mesh: Arc::new(mesh) }.into(),
+                is_deformable: true,
+                material: Material { reflectance: 0.0, ..instance.material },
+                group,
+                ..instance
+            },
+            None => Instance { visible: false, ..instance },
         }
     }
 
@@ -383,7 +455,13 @@ impl<M: VisualModel> MjvReader<M> {
     }
 
     /// Scene with the lighting of MuJoCo's renderer; `None` for invalid instances. The headlight is one of its lights.
-    fn scene(&mut self, instances: Vec<Instance>, background: Background, lights: &[Light]) -> Option<RenderScene> {
+    fn scene(
+        &mut self,
+        instances: Vec<Instance>,
+        background: Background,
+        lights: &[Light],
+        flags: DrawFlags,
+    ) -> Option<RenderScene> {
         let mut scene = match RenderScene::new(instances) {
             Ok(scene) => scene,
             Err(error) => {
@@ -397,7 +475,8 @@ impl<M: VisualModel> MjvReader<M> {
         let ambient = if lights.iter().any(|light| light.active) { [0.0; 3] } else { AMBIENT_WITHOUT_LIGHTS };
         scene.ambient = Hemisphere { sky: ambient, ground: ambient };
         scene.lighting_space = LightingSpace::Display;
-        scene.opengl = self.rules;
+        let DrawFlags { culls_backs, is_additive, .. } = flags;
+        scene.opengl = self.rules.map(|rules| OpenGlRules { culls_backs, is_additive, ..rules });
         // The skybox is behind all fog; without one, the background is black.
         let has_sky = background.skybox && self.sky.is_some();
         let fog = background.fog.filter(|_| has_sky).and_then(|fog| fog.color);
@@ -442,7 +521,7 @@ impl<M: VisualModel> MjvReader<M> {
             texture => (shape, texture),
         };
         let mut rgba = look.rgba.map(|x| f32::from_bits(x).clamp(0.0, 1.0));
-        rgba[3] = if rgba[3] >= OPAQUE { 1.0 } else { drawn_twice(rgba[3]) };
+        rgba[3] = if rgba[3] >= OPAQUE { 1.0 } else { memory.flags.opacity(rgba[3]) };
         if look.decor.is_some_and(|decor| decor.lines() > 0) {
             // Lines have their color in any light: light of at least 1, on an image of this color.
             let texture = self.one_color([rgba[0], rgba[1], rgba[2]]);
@@ -580,11 +659,23 @@ impl<M: VisualModel> MjvReader<M> {
     }
 }
 
-/// Opacity of a transparent geom: MuJoCo's renderer draws it from the front to the back, and again from the back to the
-/// front.
-fn drawn_twice(opacity: f32) -> f32 {
-    let passes = 1.0 - opacity.clamp(0.0, 1.0);
-    1.0 - passes * passes
+/// Shape of a geom whose sizes define it; `None` for other types.
+fn own_shape(kind: i32, [x, y, z]: [f32; 3]) -> Option<Shape> {
+    // The visualizer has the half length of capsules and cylinders at the end.
+    let size = match GeomType::from_id(kind)? {
+        GeomType::Capsule | GeomType::Cylinder => [x, z, 0.0],
+        _ => [x, y, z],
+    };
+    shape_from_size(kind, &size.map(f64::from))
+}
+
+impl DrawFlags {
+    /// Opacity of a transparent geom: MuJoCo's renderer draws it from the front to the back and, unless it is added to
+    /// the color behind it, again from the back to the front.
+    fn opacity(self, opacity: f32) -> f32 {
+        let passed = 1.0 - opacity.clamp(0.0, 1.0);
+        1.0 - if self.is_additive { passed } else { passed * passed }
+    }
 }
 
 impl InstanceRow {

@@ -1,6 +1,7 @@
 //! Skins and flexes: meshes whose vertices MuJoCo's visualizer computes.
 
 use super::decor::LineView;
+use super::frame::DrawFlags;
 use super::layout::SoftTypes;
 use kinetoscope_scene::mesh::TriMesh;
 use kinetoscope_scene::shape::RenderMesh;
@@ -18,7 +19,7 @@ pub struct SkinFaces {
     pub texcoords: Vec<[f32; 2]>,
 }
 
-/// Memory of a scene: its geoms and lights as bytes, and the vertices of skins and flexes in the world \[m\].
+/// Memory of a scene: its geoms and lights as bytes, its flags, and the vertices of skins and flexes in the world \[m\].
 #[derive(Clone, Copy, Debug, Default)]
 pub struct MjvMemory<'a> {
     /// Structures `mjvGeom`.
@@ -27,6 +28,8 @@ pub struct MjvMemory<'a> {
     pub lights: &'a [u8],
     /// Viewing direction of the camera, which is the direction of the headlight.
     pub forward: [f32; 3],
+    /// Flags of the scene.
+    pub flags: DrawFlags,
     /// View in which lines have their width; `None` hides lines.
     pub lines: Option<LineView>,
     /// Positions of the vertices of all skins (`skinvert`).

@@ -1,13 +1,16 @@
-from typing import Any
+from typing import Any, final
 
 import numpy as np
 import numpy.typing as npt
 
+__all__ = ["FrameList", "__version__"]
+
 __version__: str
 
+@final
 class FrameList:
-    def __init__(
-        self,
+    def __new__(
+        cls,
         arrays: dict[str, npt.NDArray[Any]],
         geom_fields: dict[str, int],
         light_fields: dict[str, int],
@@ -16,7 +19,8 @@ class FrameList:
         wraps_textures: bool,
         shadows: list[float],
         decor_casts: bool,
-    ) -> None: ...
+        quality: list[int],
+    ) -> FrameList: ...
     def reload(self, arrays: dict[str, npt.NDArray[Any]]) -> None: ...
     def omitted(self) -> list[str]: ...
     def __len__(self) -> int: ...

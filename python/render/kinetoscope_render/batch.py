@@ -92,9 +92,9 @@ class BatchRenderer:
             capture.frames.clear()
             for data, which in zip(states, cameras):
                 capture.update(data, which, scene_option)
-                capture.capture(self.height, self.width, colors="rgb" in names)
+                capture.capture(self.height, self.width)
             if states:
-                capture.frames.render(**{name: buffer.reshape(-1) for name, buffer in buffers.items()})
+                capture.render(self.height, self.width, buffers)
         for name, buffer in buffers.items():
             given = outs.get(name)
             if given is not None and given is not buffer:

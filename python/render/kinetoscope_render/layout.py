@@ -56,7 +56,7 @@ def _address(structure: Any, field: str) -> int:
         raise LayoutError(
             f"the field {field!r} of mujoco {mujoco.__version__} is not an array of {size} single-precision numbers"
         )
-    return array.__array_interface__["data"][0]
+    return int(array.__array_interface__["data"][0])
 
 
 def _memory(address: int, size: int) -> np.ndarray:

@@ -30,13 +30,14 @@ def _texture_of_materials(model: mujoco.MjModel) -> np.ndarray:
         return texture
     # Since 3.2, a material has one texture for each role.
     roles = mujoco.mjtTextureRole
-    return np.maximum(texture[:, int(roles.mjTEXROLE_RGB)], texture[:, int(roles.mjTEXROLE_RGBA)])
+    of_role = [texture[:, int(role)] for role in (roles.mjTEXROLE_RGB, roles.mjTEXROLE_RGBA)]
+    return np.asarray(np.maximum(*of_role))
 
 
 def _texcoord_counts(model: mujoco.MjModel) -> np.ndarray:
     """Number of texture coordinates of each mesh."""
     if hasattr(model, "mesh_texcoordnum"):
-        return model.mesh_texcoordnum
+        return np.asarray(model.mesh_texcoordnum)
     first = np.asarray(model.mesh_texcoordadr)
     ends = np.append(np.unique(first[first >= 0]), np.asarray(model.mesh_texcoord).size // 2)
     return np.array([ends[np.searchsorted(ends, k, side="right")] - k if k >= 0 else 0 for k in first], np.int64)

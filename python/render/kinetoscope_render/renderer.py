@@ -129,10 +129,12 @@ class Renderer:
         Raises:
             RuntimeError: The renderer is closed, or another thread uses it.
             ValueError: `out` has another shape.
-            NotImplementedError: The scene has a flag or a camera that is not supported.
+            NotImplementedError: The scene has a transform (`scene.enabletransform`).
         """
         capture = self._open()
         size = (self._height, self._width)
+        shape: tuple[int, ...]
+        dtype: Any
         if self._depth_rendering:
             channel, shape, dtype = "depth", size, np.float32
         elif self._segmentation_rendering:
@@ -142,8 +144,8 @@ class Renderer:
         buffer = output_buffer(out, shape, dtype, "out")
         with capture.exclusive():
             capture.frames.clear()
-            capture.capture(self._height, self._width, colors=channel == "rgb")
-            capture.frames.render(**{channel: buffer.reshape(-1)})
+            capture.capture(self._height, self._width)
+            capture.render(self._height, self._width, {channel: buffer})
         if out is None or out is buffer:
             return buffer
         np.copyto(out, buffer, casting="unsafe")

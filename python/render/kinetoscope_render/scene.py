@@ -12,12 +12,10 @@ import mujoco
 import numpy as np
 
 from kinetoscope_render import _render
+from kinetoscope_render.flag_colors import FlagColors
 from kinetoscope_render.layout import layouts, scene_memory
 from kinetoscope_render.model import model_arrays
 
-# Flags of rendering that have no counterpart here, and those that replace colors by other quantities.
-_UNSUPPORTED_FLAGS = ("mjRND_WIREFRAME", "mjRND_ADDITIVE")
-_COLOR_FLAGS = ("mjRND_DEPTH", "mjRND_SEGMENT", "mjRND_IDCOLOR")
 _FLAGS = {name: int(value) for name, value in mujoco.mjtRndFlag.__members__.items()}
 # Arrays of a state whose lengths are compared with those of the model.
 _SIZES = (
@@ -26,6 +24,8 @@ _SIZES = (
     ("ten_length", "ntendon"), ("mocap_pos", "nmocap"), ("sensordata", "nsensordata"), ("flexvert_xpos", "nflexvert"),
 )
 _MAX_THREADS = 1024
+# Numbers per pixel of the channels of `FrameList.render`.
+_COMPONENTS = {"rgb": 3, "depth": 1, "segmentation": 2, "segments": 1, "normal": 3}
 # True for versions whose spheres, boxes, ... have texture coordinates.
 _WRAPS_TEXTURES = tuple(int(part) for part in mujoco.__version__.split(".")[:2]) >= (3, 12)
 # True for versions in which decoration casts no shadows.
@@ -136,13 +136,17 @@ class SceneCapture:
         self._shadows = [float(extent * visual.map.shadowclip), float(visual.map.shadowscale)]
         self._has_shadows = visual.quality.shadowsize > 0
         self._line_width = float(getattr(visual.global_, "linewidth", 1.0))
+        quality = (visual.quality.numslices, visual.quality.numstacks, visual.quality.numquads)
+        polygons = [min(max(int(number), 1), 1000) for number in quality]
         self.frames = _render.FrameList(
             model_arrays(model), found.geom, found.light, threads, samples, _WRAPS_TEXTURES, self._shadows,
-            not _DECOR_IS_LIGHT
+            not _DECOR_IS_LIGHT, polygons,
         )
         self._haze = [*map(float, visual.rgba.haze[:3]), float(visual.map.haze)]
         self._fog = [*map(float, visual.rgba.fog[:3])]
         self._fog += [float(visual.map.fogstart * extent), float(visual.map.fogend * extent)]
+        self._colors = FlagColors(self.scene)
+        self._is_stereo = False
         self._lock = threading.Lock()
         self._process = os.getpid()
 
@@ -191,29 +195,37 @@ class SceneCapture:
         if getattr(data, "signature", None) != getattr(model, "signature", None):
             raise ValueError("data belongs to another model: its signature is not that of the model of this renderer")
         camera = resolve_camera(model, camera)
+        # MuJoCo moves infinite planes below the camera that the scene had before. Images do not depend on earlier ones.
+        mujoco.mjv_updateCamera(model, data, camera, self.scene)
         mujoco.mjv_updateScene(
             model, data, option or self.option, None, camera, int(mujoco.mjtCatBit.mjCAT_ALL), self.scene
         )
 
-    def capture(self, height: int, width: int, *, colors: bool) -> None:
-        """Adds the scene, as it is now, to the frames. `colors` is true if the image of color is wanted.
+    def capture(self, height: int, width: int) -> None:
+        """Adds the scene, as it is now, to the frames: two frames of half the width for a stereo pair.
 
         Raises:
-            NotImplementedError: The scene has a flag, a transform or a camera that is not supported.
+            NotImplementedError: The scene has a transform.
         """
         scene = self.scene
-        flags = scene.flags
-        for name in _UNSUPPORTED_FLAGS + (_COLOR_FLAGS if colors else ()):
-            if name in _FLAGS and flags[_FLAGS[name]]:
-                raise NotImplementedError(f"scene.flags[mujoco.mjtRndFlag.{name}] is not supported")
-        if int(scene.stereo) != int(mujoco.mjtStereo.mjSTEREO_NONE):
-            raise NotImplementedError("scene.stereo is not supported: only mjSTEREO_NONE is")
         if scene.enabletransform:
             raise NotImplementedError("scene.enabletransform is not supported")
         left, right = scene.camera
+        self._colors = FlagColors(scene)
+        # Stereo of windows (mjSTEREO_QUADBUFFERED) is side by side in images.
+        self._is_stereo = int(scene.stereo) != int(mujoco.mjtStereo.mjSTEREO_NONE)
+        if not self._is_stereo:
+            # The cameras of the pair are averaged, as in MuJoCo's images.
+            self._capture_view(left, right, height, width)
+        elif width >= 2:
+            for camera in (left, right):
+                self._capture_view(camera, camera, height, width // 2)
+
+    def _capture_view(self, left: Any, right: Any, height: int, width: int) -> None:
+        """Adds the scene, from the mean of two cameras, to the frames."""
+        scene, flags = self.scene, self.scene.flags
         orthographic = float(bool(getattr(left, "orthographic", 0)))
 
-        # The cameras of a stereo pair are averaged, as in MuJoCo's images.
         def mean(field: str) -> float:
             # Before 3.0, all pixels are square: there is no width.
             return 0.5 * (float(getattr(left, field, 0.0)) + float(getattr(right, field, 0.0)))
@@ -223,12 +235,61 @@ class SceneCapture:
         frustum = ("frustum_center", "frustum_width", "frustum_bottom", "frustum_top", "frustum_near")
         camera = [*np.concatenate(vectors).tolist(), *map(mean, frustum), far, orthographic, self._line_width]
         on = [float(flags[_FLAGS[name]]) for name in ("mjRND_SKYBOX", "mjRND_HAZE", "mjRND_FOG")]
-        effects = [bool(flags[_FLAGS[name]]) for name in ("mjRND_SHADOW", "mjRND_REFLECTION")]
+        names = ("mjRND_SHADOW", "mjRND_REFLECTION", "mjRND_CULL_FACE", "mjRND_ADDITIVE", "mjRND_WIREFRAME")
+        effects = [bool(flags[_FLAGS[name]]) for name in names]
         effects[0] = effects[0] and self._has_shadows
         self.frames.capture(
             self._geoms[: scene.ngeom], self._lights[: scene.nlight], camera, [*on, *self._haze, *self._fog, far],
             effects, [width, height], self._soft(),
         )
+
+    def render(
+        self, height: int, width: int, images: dict[str, np.ndarray], *, surfaces_of_color: bool = False
+    ) -> None:
+        """Renders the captured scenes.
+
+        Args:
+            height: Height of the images [pixels].
+            width: Width of the images [pixels].
+            images: Contiguous arrays for the images of all scenes, by channel of `FrameList.render`.
+            surfaces_of_color: True if depth and normals show geoms without a segmentation id too.
+        """
+        source = self._colors.source if "rgb" in images else None
+        if source is not None:
+            # Flags of the scene replace the colors.
+            rgb = images["rgb"]
+            images = {name: image for name, image in images.items() if name != "rgb"}
+            name, dtype = source
+            shown = np.empty(rgb.size // 3, dtype)
+            self._render_views(height, width, not self._colors.is_segments, {name: shown})
+            rgb.reshape(-1, 3)[...] = self._colors.of(shown)
+        if images:
+            self._render_views(height, width, surfaces_of_color, images)
+
+    def _render_views(
+        self, height: int, width: int, surfaces_of_color: bool, images: dict[str, np.ndarray]
+    ) -> None:
+        """Renders the frames, and joins those of stereo pairs side by side."""
+        if not self._is_stereo:
+            flat = {name: image.reshape(-1) for name, image in images.items()}
+            self.frames.render(**flat, surfaces_of_color=surfaces_of_color)
+            return
+        # The last column of an odd width stays empty.
+        half, halves = width // 2, {}
+        far = float(self.scene.camera[0].frustum_far)
+        for name, image in images.items():
+            components = _COMPONENTS[name]
+            count = image.size // (height * width * components)
+            image.reshape(-1)[...] = {"depth": far, "segmentation": -1, "segments": -1}.get(name, 0)
+            halves[name] = np.empty((count, 2, height, half, components), image.dtype)
+        if half == 0:
+            return
+        self.frames.render(
+            **{name: image.reshape(-1) for name, image in halves.items()}, surfaces_of_color=surfaces_of_color
+        )
+        for name, pair in halves.items():
+            whole = images[name].reshape(len(pair), height, width, -1)
+            whole[:, :, :half], whole[:, :, half : 2 * half] = pair[:, 0], pair[:, 1]
 
     def _soft(self) -> Optional[tuple[list[np.ndarray], list[np.ndarray]]]:
         """Vertices of skins and flexes."""

@@ -12,6 +12,7 @@ from typing import Any, Callable, Optional
 import mujoco
 import numpy as np
 
+from kinetoscope_render.flag_colors import FlagColors
 from kinetoscope_render.scene import SceneCapture
 
 
@@ -36,9 +37,7 @@ class MjrContext:
         del font_scale
         self._capture: Optional[SceneCapture] = None
         self._size = (0, 0)
-        self._flags: tuple[bool, bool] = (False, False)
-        self._range = (0.0, 1.0)
-        self._orthographic = False
+        self._colors: Optional[FlagColors] = None
         self.offWidth = self.offHeight = 0
         self.offSamples = 0
         self.currentBuffer = int(mujoco.mjtFramebuffer.mjFB_OFFSCREEN)
@@ -69,8 +68,9 @@ def _for_our_context(function: Callable[..., None]) -> Callable[..., None]:
     def dispatch(*args: Any, **kwargs: Any) -> None:
         is_ours = any(isinstance(value, MjrContext) for value in (*args, *kwargs.values()))
         if is_ours or original is None:
-            return function(*args, **kwargs)
-        return original(*args, **kwargs)
+            function(*args, **kwargs)
+        else:
+            original(*args, **kwargs)
 
     return dispatch
 
@@ -85,25 +85,14 @@ def _extent(viewport: Any) -> tuple[int, int]:
 def mjr_render(viewport: Any, scn: Any, con: MjrContext) -> None:
     """Captures a scene; `mjr_readPixels` renders it."""
     capture, (height, width) = con._open(), _extent(viewport)
-    segment, id_color = (bool(scn.flags[int(flag)]) for flag in (
-        mujoco.mjtRndFlag.mjRND_SEGMENT, mujoco.mjtRndFlag.mjRND_IDCOLOR,
-    ))
-    depth = getattr(mujoco.mjtRndFlag, "mjRND_DEPTH", None)
-    if depth is not None and scn.flags[int(depth)]:
-        raise NotImplementedError("scene.flags[mjRND_DEPTH] (depth as colors) is not supported")
-    if segment and not id_color:
-        raise NotImplementedError("scene.flags[mjRND_SEGMENT] without mjRND_IDCOLOR (random colors) is not supported")
     with capture.exclusive():
         if con._changed is not None:
             capture.reload(con._changed)
             con._changed = None
         capture.use_scene(scn)
         capture.frames.clear()
-        capture.capture(height, width, colors=False)
-    con._size, con._flags = (height, width), (segment, id_color)
-    camera = scn.camera[0]
-    con._range = float(camera.frustum_near), float(camera.frustum_far)
-    con._orthographic = bool(getattr(camera, "orthographic", False))
+        capture.capture(height, width)
+    con._size, con._colors = (height, width), FlagColors(scn)
 
 
 @_for_our_context
@@ -113,35 +102,24 @@ def mjr_readPixels(rgb: Any, depth: Any, viewport: Any, con: MjrContext) -> None
     With the flag `mjRND_SEGMENT`, colors are segmentation ids plus 1.
     """
     capture, (height, width) = con._open(), _extent(viewport)
-    if (height, width) != con._size:
+    colors = con._colors
+    if colors is None or (height, width) != con._size:
         raise ValueError(f"the viewport is {width} x {height}, but the scene was rendered to "
                          f"{con._size[1]} x {con._size[0]}")
-    segment = con._flags[0]
     wanted: dict[str, np.ndarray] = {}
     if rgb is not None:
-        if segment:
-            wanted["segments"] = np.empty(height * width, np.int32)
-        else:
-            wanted["rgb"] = np.empty(height * width * 3, np.uint8)
+        wanted["rgb"] = np.empty((height, width, 3), np.uint8)
     if depth is not None:
-        wanted["depth"] = np.empty(height * width, np.float32)
+        wanted["depth"] = np.empty((height, width), np.float32)
     if not wanted:
         return
     # Without the segmentation flag, depth shows all that color shows.
     with capture.exclusive():
-        capture.frames.render(**wanted, surfaces_of_color=not segment)
+        capture.render(height, width, wanted, surfaces_of_color=not colors.is_segments)
     if rgb is not None:
-        if segment:
-            ids = (wanted["segments"] + 1).reshape(height, width)
-            image = np.stack([ids & 255, ids >> 8 & 255, ids >> 16 & 255], axis=-1).astype(np.uint8)
-        else:
-            image = wanted["rgb"].reshape(height, width, 3)
-        _store(rgb, image[::-1], "rgb")
+        _store(rgb, wanted["rgb"][::-1], "rgb")
     if depth is not None:
-        near, far = con._range
-        metric = wanted["depth"].reshape(height, width).astype(np.float64)
-        nearness = 1.0 if con._orthographic else near / metric
-        from_far = nearness * (far - metric) / (far - near)
+        from_far = colors.nearness(wanted["depth"])
         zero_far = getattr(mujoco, "mjtDepthMap", None) is not None and int(con.readDepthMap) == int(
             mujoco.mjtDepthMap.mjDEPTH_ZEROFAR
         )

@@ -5,11 +5,12 @@ use crate::model_arrays::ModelArrays;
 use crate::panic::catch;
 use kinetoscope_look::horizon_haze;
 use kinetoscope_look::mjv::{
-    Background, GeomLayout, LightLayout, LineView, MjvCamera, MjvFrame, MjvMemory, MjvObject, MjvReader, TextureRule,
+    Background, DrawFlags, GeomLayout, LightLayout, LineView, MjvCamera, MjvFrame, MjvMemory, MjvObject, MjvReader,
+    TextureRule,
 };
 use kinetoscope_render::frame::FrameMut;
 use kinetoscope_render::{ParallelRenderer, RasterCfg, RenderRequest, ToneCurve, View};
-use kinetoscope_scene::{Haze, OpenGlRules};
+use kinetoscope_scene::{Haze, OpenGlRules, Tessellation};
 use numpy::{PyReadonlyArray1, PyReadonlyArray2, PyReadwriteArray1};
 use pyo3::exceptions::{PyMemoryError, PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
@@ -113,7 +114,7 @@ impl FrameList {
     /// Copies the arrays of a model. `arrays` has the names of `MjModel`; the layouts have the places of fields.
     /// `wraps_textures` is true for versions of MuJoCo whose shapes have texture coordinates. `shadows` are half the side
     /// of the square in which directional lights cast shadows \[m\], and the fraction of the angle in which spots do; decoration
-    /// casts shadows if `decor_casts` is true.
+    /// casts shadows if `decor_casts` is true. `quality` has the numbers of slices, stacks and quads of shapes.
     #[new]
     #[expect(clippy::too_many_arguments, reason = "an internal function of the package")]
     fn new(
@@ -125,11 +126,15 @@ impl FrameList {
         wraps_textures: bool,
         shadows: [f64; 2],
         decor_casts: bool,
+        quality: [u16; 3],
     ) -> PyResult<Self> {
         catch(|| {
             let textures = if wraps_textures { TextureRule::Wrapped } else { TextureRule::Projected };
             let [shadow_clip, shadow_scale] = shadows.map(|x| x as f32);
-            let rules = OpenGlRules { shadow_clip, shadow_scale };
+            // The flags are those of each frame.
+            let [slices, stacks, quads] = quality;
+            let tessellation = Some(Tessellation { slices, stacks, quads });
+            let rules = OpenGlRules { shadow_clip, shadow_scale, culls_backs: false, is_additive: false, tessellation };
             let (geoms, lights) = (geom_layout(geom_fields)?, light_layout(light_fields)?);
             let kind = ReaderKind { geoms, lights, textures, rules, decor_casts };
             let reader = kind.reader(arrays)?;
@@ -166,8 +171,8 @@ impl FrameList {
 
     /// Captures a scene: the memory of its geoms (N, stride) and lights (L, stride), its camera (position, forward, up,
     /// center, half width, bottom, top, near, far, 1 if it is orthographic, width of lines \[pixels\]), its visual
-    /// options, its effects (shadows, reflections), the size of the image (width, height) \[pixels\], and the vertices
-    /// of its skins and flexes.
+    /// options, its flags (shadows, reflections, culled backs, added transparent geoms, wireframe), the size of the image
+    /// (width, height) \[pixels\], and the vertices of its skins and flexes.
     #[pyo3(signature = (geoms, lights, camera, options, effects, size, soft=None))]
     #[expect(clippy::too_many_arguments, reason = "an internal function of the package")]
     fn capture(
@@ -176,7 +181,7 @@ impl FrameList {
         lights: PyReadonlyArray2<'_, u8>,
         camera: [f64; 17],
         options: [f64; 13],
-        effects: [bool; 2],
+        effects: [bool; 5],
         size: [usize; 2],
         soft: Option<SoftArrays<'_>>,
     ) -> PyResult<()> {
@@ -210,9 +215,12 @@ impl FrameList {
                 forward: world_from_camera.rotation.map(|row| row[2]),
                 width: line as f32 / fy,
                 near,
+                far,
                 parallel,
             };
-            let mut memory = MjvMemory { geoms, lights, forward, lines: Some(lines), ..MjvMemory::default() };
+            let [shadows, reflections, culls_backs, is_additive, is_wireframe] = effects;
+            let flags = DrawFlags { culls_backs, is_additive, is_wireframe };
+            let mut memory = MjvMemory { geoms, lights, forward, flags, lines: Some(lines), ..MjvMemory::default() };
             if let Some((floats, integers)) = &soft {
                 let [skin_positions, skin_normals, flex_positions, flex_normals, flex_texcoords] = floats;
                 let [first_faces, faces] = integers;
@@ -228,7 +236,6 @@ impl FrameList {
                 };
             }
             let content = self.reader.read(&memory, background).map_err(invalid)?;
-            let [shadows, reflections] = effects;
             self.frames.push(CapturedFrame { content, view, effects: Effects { shadows, reflections } });
             Ok(())
         })

@@ -52,16 +52,15 @@ def test_segmentation(rows):
 
 
 def test_color(rows):
-    """Small images have more edges than those of the page, whose bar is 40 dB."""
+    """The bar is that of the page, whose images have the same size."""
     colors = column(rows, "psnr")
     print(f"median {statistics.median(colors):.1f} dB")
-    assert statistics.median(colors) >= 37
+    assert statistics.median(colors) >= 40
 
 
 def test_low_views(rows):
-    """No view is much worse than the others without a cause on the page."""
-    low = {key: value for key, value in page.low_views({"models": rows}).items() if value < page.LEAST - 2}
-    unknown = {key: value for key, value in low.items() if key not in page.CAUSES}
+    """Each view that is much worse than the others has a cause on the page."""
+    unknown = {key: value for key, value in page.low_views({"models": rows}).items() if key not in page.CAUSES}
     assert not unknown, unknown
 
 

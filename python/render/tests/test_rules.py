@@ -40,6 +40,8 @@ def pair(model, data, prepare=None, camera="c"):
             update = renderer.update_scene
 
             def update_and_prepare(data, camera, update=update, renderer=renderer):
+                # Twice: MuJoCo moves infinite planes below the camera of the update before.
+                update(data, camera)
                 update(data, camera)
                 prepare(renderer.scene)
 

@@ -32,6 +32,8 @@ pub(crate) struct PlacedInstance {
     /// True if the camera is outside of the instance's bounds, by enough that the near plane cuts nothing off. Always
     /// true in a parallel projection.
     pub(crate) outside: bool,
+    /// True if backs are invisible, see [`OpenGlRules::culls_backs`].
+    pub(crate) culls_backs: bool,
     /// Level of the mesh that is rendered: ids count that level's triangles.
     pub(crate) level: u8,
     /// Largest distance of that level from the mesh \[m\].
@@ -145,6 +147,9 @@ impl DrawList {
         keep: impl Fn(&Instance) -> Layer,
     ) {
         self.error = 0.0;
+        let largest_shift = lod::largest_shift(scene, projection);
+        // Backs cast shadows.
+        let culls = projection.is_camera && scene.opengl.is_some_and(|rules| rules.culls_backs);
         self.reserve(scene, parts, &keep);
         for (index, (instance, pose)) in scene.instances().iter().zip(poses).enumerate() {
             let [lo, hi] = instance.shape.aabb();
@@ -159,7 +164,8 @@ impl DrawList {
                 let margin = 2.0 * projection.near;
                 (0..3).any(|k| t[k] < lo[k] - margin || t[k] > hi[k] + margin)
             };
-            let placed = PlacedInstance { camera_from_instance, local, outside, level: 0, error: 0.0 };
+            let culls_backs = culls && instance.group != Marker::GROUP;
+            let placed = PlacedInstance { camera_from_instance, local, outside, culls_backs, level: 0, error: 0.0 };
             self.placed.push(placed);
             let layer = keep(instance);
             if layer == Layer::Hidden
@@ -185,7 +191,7 @@ impl DrawList {
                 continue;
             };
             let level = if parts == Granularity::LodClusters {
-                lod::select_level(projection, instance, &placed.camera_from_instance)
+                lod::select_level(projection, instance, &placed.camera_from_instance, largest_shift)
             } else {
                 0
             };
@@ -193,7 +199,8 @@ impl DrawList {
             self.placed[index] = PlacedInstance { level, error, ..placed };
             self.error = self.error.max(error);
             for (k, cluster) in mesh.level(usize::from(level)).clusters().iter().enumerate() {
-                if outside && faces_away(projection, &placed, cluster) {
+                let is_culled = culls_backs || outside && cluster.closed;
+                if is_culled && faces_away(projection, &placed, cluster) {
                     continue;
                 }
                 let c = placed.camera_from_instance.apply(cluster.center);
@@ -230,9 +237,9 @@ fn is_in_front(projection: &Projection, camera_from_instance: &PoseF32, lo: [f32
     camera_from_instance.translation[2] + nearest(0) + nearest(1) + nearest(2) > 2.0 * projection.near
 }
 
-/// True if all triangles of a cluster are certainly back-facing; false for a cluster that is not closed.
+/// True if all triangles of a cluster are certainly back-facing.
 fn faces_away(projection: &Projection, placed: &PlacedInstance, cluster: &Cluster) -> bool {
-    if !cluster.closed || cluster.cone_cos <= 0.0 {
+    if cluster.cone_cos <= 0.0 {
         return false;
     }
     let camera = &placed.local.instance_from_camera;

@@ -2,29 +2,41 @@
 
 use crate::visibility::Projection;
 use kinetoscope_scene::shape::Shape;
-use kinetoscope_scene::{Instance, PoseF32};
+use kinetoscope_scene::{Instance, PoseF32, RenderScene};
 
 /// Largest displacement of a surface \[m\].
 const DISTANCE: f32 = 1e-3;
 /// Largest displacement in the image \[pixels\] (or texels of a shadow map).
 const PIXELS: f32 = 0.5;
+/// Largest displacement in the image with [`RenderScene::opengl`]: images are compared with those of meshes at full detail.
+const OPENGL_PIXELS: f32 = 0.1;
+
+/// Largest displacement in the image of a scene \[pixels\].
+pub(crate) fn largest_shift(scene: &RenderScene, projection: &Projection) -> f32 {
+    if scene.opengl.is_some() && projection.is_camera { OPENGL_PIXELS } else { PIXELS }
+}
 
 /// Selects the coarsest level of an instance's mesh whose surface is nowhere farther from the mesh than [`DISTANCE`],
-/// and than [`PIXELS`] anywhere in the image. 0 is the mesh itself. The level depends on the instance, its pose and the
+/// and than `pixels` anywhere in the image. 0 is the mesh itself. The level depends on the instance, its pose and the
 /// projection only.
 ///
 /// Terrain has no levels: cameras stand on it.
-pub(crate) fn select_level(projection: &Projection, instance: &Instance, camera_from_instance: &PoseF32) -> u8 {
+pub(crate) fn select_level(
+    projection: &Projection,
+    instance: &Instance,
+    camera_from_instance: &PoseF32,
+    pixels: f32,
+) -> u8 {
     let Shape::Mesh(shape) = &instance.shape else { return 0 };
     let [lo, hi] = shape.mesh.bounds();
-    shape.mesh.level_within(tolerance(projection, camera_from_instance, [lo, hi])) as u8
+    shape.mesh.level_within(tolerance(projection, camera_from_instance, [lo, hi], pixels)) as u8
 }
 
 /// Largest allowed displacement of a surface within bounds \[m\]; 0 if the bounds reach behind the near plane.
-fn tolerance(projection: &Projection, camera_from_instance: &PoseF32, [lo, hi]: [[f32; 3]; 2]) -> f32 {
+fn tolerance(projection: &Projection, camera_from_instance: &PoseF32, [lo, hi]: [[f32; 3]; 2], pixels: f32) -> f32 {
     let f = projection.fx.max(projection.fy);
     if projection.parallel {
-        return DISTANCE.min(PIXELS / f);
+        return DISTANCE.min(pixels / f);
     }
     let middle = camera_from_instance.apply([0, 1, 2].map(|k| 0.5 * (lo[k] + hi[k])));
     let forward = camera_from_instance.rotation[2];
@@ -39,7 +51,7 @@ fn tolerance(projection: &Projection, camera_from_instance: &PoseF32, [lo, hi]: 
     let slope = |size: usize, c: f32, f: f32| c.abs().max((size as f32 - c).abs()) / f;
     let (x, y) =
         (slope(projection.width, projection.cx, projection.fx), slope(projection.height, projection.cy, projection.fy));
-    DISTANCE.min(PIXELS * near / (f * (1.0 + x * x + y * y).sqrt()))
+    DISTANCE.min(pixels * near / (f * (1.0 + x * x + y * y).sqrt()))
 }
 
 #[cfg(test)]
@@ -66,7 +78,7 @@ mod tests {
         let mut closest = 0.0f64;
         for distance in [0.4, 0.45, 0.5, 0.6] {
             let pose = PoseF32::from_translation([0.0, 0.0, distance]);
-            let allowed = f64::from(tolerance(&projection, &pose, bounds));
+            let allowed = f64::from(tolerance(&projection, &pose, bounds, PIXELS));
             assert!(allowed > 0.0 && allowed <= f64::from(DISTANCE));
             let z = f64::from(distance) - 0.3;
             let f = [250.0, 310.0];
@@ -93,7 +105,7 @@ mod tests {
         let view = View::look_at([64, 64], 0.9, [0.; 3], [0., 0., 1.], [0., 1., 0.]).expect("a good view");
         let projection = Projection::from(&view);
         let bounds = [[-0.1; 3], [0.1; 3]];
-        let at = |z: f32| tolerance(&projection, &PoseF32::from_translation([0., 0., z]), bounds);
+        let at = |z: f32| tolerance(&projection, &PoseF32::from_translation([0., 0., z]), bounds, PIXELS);
         assert!(at(0.0) == 0.0 && at(-1.0) == 0.0 && at(0.11) == 0.0 && at(f32::NAN) == 0.0);
         assert!(at(0.12) > 0.0 && at(0.12) < at(0.2) && at(100.0) == DISTANCE);
     }

@@ -18,8 +18,8 @@ pub use draw_list::Layer;
 pub(crate) use draw_list::{DrawItem, DrawList, Granularity, PlacedInstance};
 use kinetoscope_scene::RenderScene;
 use kinetoscope_scene::shape::Shape;
-pub(crate) use lod::select_level;
-use tile::{BLOCK, NO_ID, SAMPLES, Tile};
+pub(crate) use lod::{largest_shift, select_level};
+use tile::{BLOCK, NO_ID, Tile};
 
 /// Rasterizes items into a visibility buffer.
 #[derive(Clone, Debug, Default)]
@@ -61,7 +61,7 @@ impl VisibilityRasterizer {
                     let pass = ClusterPass {
                         projection,
                         camera_from_instance: &placed.camera_from_instance,
-                        cull: cluster.closed && placed.outside,
+                        cull: placed.culls_backs || cluster.closed && placed.outside,
                         first_id,
                     };
                     let vertices = &mut self.vertices;
@@ -115,7 +115,8 @@ fn draw_infinite_plane<S: Simd>(
             // Most of a floor is the first item in its blocks, which then need no comparison.
             let empty = tile.take_cleared(block);
             let mut drawn = false;
-            for (plane, offset) in SAMPLES.iter().enumerate().take(tile.planes) {
+            let offsets = tile.offsets;
+            for (plane, offset) in offsets.iter().enumerate().take(tile.planes) {
                 let offset = offset.map(|x| x as f32 / 256.0);
                 let u = load(s, &COLUMN) + ((bx * BLOCK) as f32 + 0.5 + offset[0]);
                 let across = (u - projection.cx) * camera.inverse_f[0] * right;
@@ -181,7 +182,8 @@ fn draw_primitive<S: Simd>(
             }
             tile.prepare_block(block);
             let mut drawn = false;
-            for (plane, offset) in SAMPLES.iter().enumerate().take(tile.planes) {
+            let offsets = tile.offsets;
+            for (plane, offset) in offsets.iter().enumerate().take(tile.planes) {
                 let offset = offset.map(|x| x as f32 / 256.0);
                 let u = load(s, &COLUMN) + ((bx * BLOCK) as f32 + 0.5 + offset[0]);
                 let samples = tile.samples(block, plane);
@@ -189,7 +191,10 @@ fn draw_primitive<S: Simd>(
                     let v = load(s, &ROW) + ((by * BLOCK + 2 * row) as f32 + 0.5 + offset[1]);
                     let (o, d) = projection.rays(s, &placed.local, u, v);
                     let hit = primitive::intersect(s, shape, o, d, projection.near);
-                    if !hit.hit.any_true() {
+                    // The interval inside of a solid ends at its back.
+                    let is_hit =
+                        if placed.culls_backs { hit.hit & hit.normal.dot(d).simd_lt(splat(s, 0.0)) } else { hit.hit };
+                    if !is_hit.any_true() {
                         continue;
                     }
                     let q = match shape {
@@ -199,7 +204,7 @@ fn draw_primitive<S: Simd>(
                         }
                         _ => projection.nearness_lanes(hit.t),
                     };
-                    drawn |= depth_test(s, tile, samples + row * LANES, hit.hit, q, hit.face + splat_u(s, first_id));
+                    drawn |= depth_test(s, tile, samples + row * LANES, is_hit, q, hit.face + splat_u(s, first_id));
                 }
             }
             if drawn {

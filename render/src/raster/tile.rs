@@ -10,6 +10,8 @@ pub(crate) const NO_ID: u32 = u32::MAX;
 /// Sample positions in a pixel, from its center, in 1/256 pixel. The first is the center, used by all channels but
 /// color; the other four are the rotated grid of GPUs.
 pub(crate) const SAMPLES: [[i32; 2]; 5] = [[0, 0], [-32, -96], [96, -32], [-96, 32], [32, 96]];
+/// The same grid mirrored, as in OpenGL: the rows of its images go up.
+pub(crate) const OPENGL_SAMPLES: [[i32; 2]; 5] = [[0, 0], [-32, 96], [96, 32], [-96, -32], [32, -96]];
 /// The largest offset of a sample.
 pub(crate) const MAX_SAMPLE_OFFSET: i32 = 96;
 
@@ -23,6 +25,8 @@ pub(crate) struct Tile {
     pub(crate) blocks_y: usize,
     /// 1, or 5 with multisampling.
     pub(crate) planes: usize,
+    /// Positions of the samples of each plane, in 1/256 pixel.
+    pub(crate) offsets: [[i32; 2]; SAMPLES.len()],
     pub(crate) nearness: Vec<f32>,
     pub(crate) id: Vec<u32>,
     /// Lower bound of the nearness in each block.
@@ -106,6 +110,7 @@ impl Tile {
     pub(crate) fn copy(&mut self, other: &Self) {
         let Self { x0, y0, blocks_x, blocks_y, planes, .. } = *other;
         (self.x0, self.y0, self.blocks_x, self.blocks_y, self.planes) = (x0, y0, blocks_x, blocks_y, planes);
+        self.offsets = other.offsets;
         self.nearness.clone_from(&other.nearness);
         self.id.clone_from(&other.id);
         self.farthest.clone_from(&other.farthest);

@@ -8,7 +8,7 @@
 //! sign and steps by the edge's differences: within a block it changes by less than 14 * 2^23 < 2^27. The value at a
 //! block's corner is clamped to ±2^30, which keeps every sign in the block, and the rest is done in `i32`.
 
-use super::tile::{BLOCK, MAX_SAMPLE_OFFSET, SAMPLES, Tile};
+use super::tile::{BLOCK, MAX_SAMPLE_OFFSET, Tile};
 use crate::simd::{COLUMN, F, I, ROW, Simd, load, load_i, load_u, max, min, select, select_i, select_u};
 use crate::simd::{splat, splat_i, splat_u, store, store_u};
 
@@ -64,6 +64,7 @@ pub(crate) fn draw<S: Simd>(
     if (x1 - x0 + 1) * (y1 - y0 + 1) <= 4 {
         return few_pixels(tile, [x0, y0, x1, y1], a, b, c, g, nearest, id);
     }
+    let offsets = tile.offsets;
     let one_block = x0 >> 3 == x1 >> 3 && y0 >> 3 == y1 >> 3;
     let column = COLUMN.map(|x| x as i32);
     let column: I<S> = load_i(s, &column);
@@ -86,7 +87,7 @@ pub(crate) fn draw<S: Simd>(
             let last_row = ((y1.min(y + 7) - y) >> 1) as usize;
             let corner = g.at[2] + g.step[0] * (x as f32 + 0.5 - g.at[0]) + g.step[1] * (y as f32 + 0.5 - g.at[1]);
             let mut drawn = false;
-            for (plane, offset) in SAMPLES.iter().enumerate().take(tile.planes) {
+            for (plane, offset) in offsets.iter().enumerate().take(tile.planes) {
                 let mut e = [0i32; 3];
                 let mut outside = false;
                 for k in 0..3 {
@@ -143,7 +144,8 @@ fn few_pixels(
     nearest: f32,
     id: u32,
 ) {
-    for (plane, offset) in SAMPLES.iter().enumerate().take(tile.planes) {
+    let offsets = tile.offsets;
+    for (plane, offset) in offsets.iter().enumerate().take(tile.planes) {
         let start: [i64; 3] = std::array::from_fn(|k| {
             (c[k] + i64::from(a[k]) * i64::from(offset[0]) + i64::from(b[k]) * i64::from(offset[1])) >> 8
         });

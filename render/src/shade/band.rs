@@ -6,7 +6,7 @@ use super::prepared_frame::PreparedFrame;
 use super::shadow::ShadowBand;
 use crate::frame::{FrameMut, PixelGroup, Stage};
 use crate::geometry::bvh::TraversalStack;
-use crate::raster::tile::{BLOCK, Tile};
+use crate::raster::tile::{BLOCK, OPENGL_SAMPLES, SAMPLES, Tile};
 use crate::raster::{DrawItem, VisibilityRasterizer};
 use crate::request::RenderRequest;
 use crate::simd::{LANES, Simd, SimdLevel, as_lanes, at_level, load, splat_i};
@@ -84,6 +84,9 @@ impl RasterScratch {
         for first in rows.clone().step_by(step) {
             let size = [wide, step.min(rows.end - first)];
             self.tile.clear([0, first * BLOCK], size, plan.planes, projection.farthest());
+            // Rays through a lens are known for the usual samples.
+            let is_mirrored = render_request.scene.opengl.is_some() && render_request.lens.is_none();
+            self.tile.offsets = if is_mirrored { OPENGL_SAMPLES } else { SAMPLES };
             let groups = size[0] * size[1] * (BLOCK / 2);
             if frame.wants(Stage::Color) && self.colors.len() < groups {
                 self.colors.resize(groups, [[0.0; LANES]; 3]);

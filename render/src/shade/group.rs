@@ -55,6 +55,7 @@ impl<'a> ShadingContext<'a> {
             color: self.shade.scene.linear_colors()[index],
             texture_scale: self.shade.scene.texture_scales()[index],
             texture_offset: self.shade.scene.texture_offsets()[index],
+            plane_lines: self.shade.scene.plane_lines()[index],
         }
     }
 }
@@ -192,7 +193,11 @@ fn resolve_lanes<S: Simd>(
         if colors.is_some() {
             let ShadeContext { lighting, pixel, .. } = context.shade;
             let rays = ViewRays { direction: view, distance: at.t * length };
-            let mut seen = shade(s, &context.shade, &source, &at, rays, 1.0, here);
+            let corners = lighting.polygons.is_in_use().then(|| {
+                let triangles = list.map(|id| id.wrapping_sub(source.first_id));
+                lighting.polygons.corners(s, &source, source.placed.mesh(source.instance), &triangles, &at, here)
+            });
+            let mut seen = shade(s, &context.shade, &source, &at, corners.as_ref(), rays, 1.0, here);
             if let Some(mirrors) = context.mirrors.filter(|mirrors| mirrors.has(last, source.instance)) {
                 let samples = MirrorSamples { point: at.point(), view, length, color: seen };
                 seen = mirrors.reflect(s, context, &source, samples, here);

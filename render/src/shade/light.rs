@@ -1,6 +1,7 @@
 //! Shading of the rasterizer: light that a surface reflects towards the camera.
 
 use super::horizon::Horizon;
+use super::polygons::{CornerLanes, PolygonTables};
 use super::shadow::ShadowMap;
 use super::shadow_rays::ShadowRays;
 use super::surface::{InstanceSurface, Surface};
@@ -45,6 +46,8 @@ pub(crate) struct Lighting {
     pub(crate) ground_haze: Option<Horizon>,
     /// True if the headlight is one of the lights: in MuJoCo's light model it is directional.
     headlight_is_light: bool,
+    /// Polygons at whose corners light is computed.
+    pub(crate) polygons: PolygonTables,
 }
 
 /// Lighting and settings for shading surfaces.
@@ -61,6 +64,9 @@ pub(crate) struct ShadeContext<'a> {
     pub(crate) eye: Option<[f32; 3]>,
     /// False for reflections in MuJoCo's OpenGL renderer.
     pub(crate) receives_shadows: bool,
+    /// Axes of the image in the world, right and down, for the widths of pixels on surfaces in MuJoCo's OpenGL renderer;
+    /// `None` for reflections.
+    pub(crate) image_axes: Option<[[f32; 3]; 2]>,
 }
 
 /// Width of a pixel.
@@ -167,6 +173,7 @@ impl Lighting {
             (blend.color_of_srgb(sky.zenith), blend.color_of_srgb(sky.horizon), blend.color_of_srgb(sky.nadir));
         self.skybox.clone_from(&scene.skybox);
         self.mip_rule = MipRule::of(scene);
+        self.polygons.prepare(scene.opengl.and_then(|rules| rules.tessellation));
         self.haze = scene.haze.and_then(|h| h.color).map(|color| blend.color_of_srgb(color));
         self.lights.clear();
         for (k, light) in lights.iter().enumerate().filter(|(_, l)| l.active).take(MAX_LIGHTS) {
@@ -318,18 +325,20 @@ fn skybox<S: Simd>(s: S, image: &Texture, lighting: &Lighting, direction: V3<S>,
 }
 
 /// Color of a surface, in the [`BlendSpace`] of the frame. `tint` multiplies the color of the surface, but not its
-/// highlights.
+/// highlights. With `corners`, light is computed there.
 #[inline(always)]
+#[expect(clippy::too_many_arguments, reason = "inlined into its callers")]
 pub(crate) fn shade<S: Simd>(
     s: S,
     context: &ShadeContext<'_>,
     source: &InstanceSurface<'_>,
     at: &Surface<S>,
+    corners: Option<&CornerLanes<S>>,
     rays: ViewRays<S>,
     tint: f32,
     lanes: M<S>,
 ) -> V3<S> {
-    let ShadeContext { scene, lighting, shadows, shadow_rays, pixel, eye, receives_shadows } = *context;
+    let ShadeContext { scene, lighting, shadows, shadow_rays, pixel, eye, receives_shadows, image_axes } = *context;
     let ViewRays { direction: view, distance } = rays;
     let material = &source.instance.material;
     let display = scene.lighting_space == LightingSpace::Display;
@@ -380,7 +389,7 @@ pub(crate) fn shade<S: Simd>(
     }
     // The sum of all further passes, each clamped.
     let mut passes = V3::splat(s, [0.0; 3]);
-    for prepared in &lighting.lights {
+    for prepared in lighting.lights.iter().filter(|_| corners.is_none()) {
         let light = &prepared.light;
         let Some((to, strength)) = prepared.illumination(s, at.position, lanes) else { continue };
         let facing = max(n.dot(to), zero);
@@ -463,12 +472,17 @@ pub(crate) fn shade<S: Simd>(
     };
     let mut color = if display {
         // OpenGL clamps the sum at 1, highlights included, and multiplies the result by the texture.
-        let sum = plain(gloss);
-        let r = min(max(sum.x, zero), one) + passes.x;
-        let g = min(max(sum.y, zero), one) + passes.y;
-        let b = min(max(sum.z, zero), one) + passes.z;
-        let (r, g, b) = (r * 255.0, g * 255.0, b * 255.0);
-        let (r, g, b) = match texels(s, source, lighting.mip_rule, at, view, pixel, lanes) {
+        let lit = match corners {
+            Some(corners) => light_at_corners(s, context, source, at, corners, rays, tint, lanes),
+            None => {
+                let sum = plain(gloss);
+                V3 { x: min(max(sum.x, zero), one), y: min(max(sum.y, zero), one), z: min(max(sum.z, zero), one) }
+                    .add(passes)
+            }
+        };
+        let (r, g, b) = (lit.x * 255.0, lit.y * 255.0, lit.z * 255.0);
+        let texture_rays = (view, image_axes.map(|axes| (axes, distance)));
+        let (r, g, b) = match texels(s, source, lighting.mip_rule, at, texture_rays, pixel, lanes) {
             Some([x, y, z]) => (r * x * (1.0 / 255.0), g * y * (1.0 / 255.0), b * z * (1.0 / 255.0)),
             None => (r, g, b),
         };
@@ -505,6 +519,101 @@ pub(crate) fn shade<S: Simd>(
     color
 }
 
+/// Light of a surface in MuJoCo's OpenGL renderer, which computes it at the corners of polygons, clamps it there in each
+/// pass, and interpolates; only shadows are found at every point. Without textures.
+#[inline(never)]
+#[expect(clippy::too_many_arguments, reason = "as many as its caller has")]
+fn light_at_corners<S: Simd>(
+    s: S,
+    context: &ShadeContext<'_>,
+    source: &InstanceSurface<'_>,
+    at: &Surface<S>,
+    corners: &CornerLanes<S>,
+    rays: ViewRays<S>,
+    tint: f32,
+    lanes: M<S>,
+) -> V3<S> {
+    s.vectorize(
+        #[inline(always)]
+        || {
+            let ShadeContext { scene, lighting, shadows, shadow_rays, eye, receives_shadows, .. } = *context;
+            let material = &source.instance.material;
+            let receives_shadows = receives_shadows && material.rgba[3] >= 1.0;
+            let [r, g, b, _] = material.rgba;
+            let base = [r, g, b].map(|c| c * tint);
+            let (zero, one) = (splat(s, 0.0), splat(s, 1.0));
+            let shiny = Highlight::from_material(material, true);
+            let side = splat(s, if source.instance.group == OpenGlRules::BACK_GROUP { -1.0 } else { 1.0 });
+            // Mirrored rays come from a mirrored eye.
+            let eye = match eye {
+                Some(eye) => V3::splat(s, eye),
+                None => at.position.sub(rays.direction.scale(rays.distance)),
+            };
+            let ambient = [0, 1, 2].map(|k| base[k] * (scene.ambient.ground[k] + material.emission));
+            let mut sums = [V3::splat(s, ambient); 3];
+            let mut passes = V3::splat(s, [0.0; 3]);
+            for prepared in &lighting.lights {
+                let light = &prepared.light;
+                let own_pass = prepared.own_pass && receives_shadows;
+                let mut pass = V3::splat(s, [0.0; 3]);
+                for corner in 0..3 {
+                    let position = corners.positions[corner];
+                    let normal = corners.normals[corner].scale(side);
+                    let Some((to, strength)) = prepared.illumination(s, position, lanes) else { continue };
+                    let facing = max(normal.dot(to), zero);
+                    let bright = facing * strength;
+                    let (d, a) = (light.diffuse, light.ambient);
+                    let mut lit = V3 {
+                        x: bright * (base[0] * d[0]) + strength * (base[0] * a[0]),
+                        y: bright * (base[1] * d[1]) + strength * (base[1] * a[1]),
+                        z: bright * (base[2] * d[2]) + strength * (base[2] * a[2]),
+                    };
+                    if shiny.is_visible(light.specular) {
+                        // The cosine between the normal and the half vector, compared before its root is taken.
+                        let half = to.sub(position.sub(eye).unit(s));
+                        let (along, square) = (normal.dot(half), half.dot(half));
+                        let is_bright = (along * along).simd_gt(square * (shiny.faint * shiny.faint));
+                        let seen = lanes & is_bright & along.simd_gt(zero) & facing.simd_gt(zero);
+                        if seen.any_true() {
+                            let cosine = along / select(seen, square, one).sqrt();
+                            let shine =
+                                select(seen, power(s, cosine, shiny.exponent) * shiny.strength, zero) * strength;
+                            lit = lit.add(V3::splat(s, light.specular).scale(shine));
+                        }
+                    }
+                    if own_pass {
+                        let lit = V3 { x: min(lit.x, one), y: min(lit.y, one), z: min(lit.z, one) };
+                        pass = pass.add(lit.scale(corners.shares[corner]));
+                    } else {
+                        sums[corner] = sums[corner].add(lit);
+                    }
+                }
+                if !own_pass {
+                    continue;
+                }
+                let matters = lanes & max(max(pass.x, pass.y), pass.z).simd_gt(splat(s, 1e-4));
+                if !matters.any_true() {
+                    continue;
+                }
+                if let Some(map) = prepared.shadow.and_then(|k| shadows.get(k)) {
+                    pass =
+                        pass.scale(whole(s, map.visibility(s, at.position, at.normal, source.placed.error, matters)));
+                }
+                if let Some(rays) = shadow_rays.filter(|rays| rays.shadows && light.cast_shadow) {
+                    pass = pass.scale(rays.visibility(s, light, prepared.along.map(|x| -x), at.point(), matters));
+                }
+                passes = passes.add(pass);
+            }
+            let mut total = passes;
+            for (sum, share) in sums.iter().zip(corners.shares) {
+                let sum = V3 { x: min(sum.x, one), y: min(sum.y, one), z: min(sum.z, one) };
+                total = total.add(sum.scale(share));
+            }
+            total
+        },
+    )
+}
+
 /// Linear base color of a surface.
 #[inline(always)]
 pub(crate) fn albedo<S: Simd>(
@@ -516,7 +625,9 @@ pub(crate) fn albedo<S: Simd>(
     lanes: M<S>,
 ) -> V3<S> {
     let flat = source.color;
-    let Some(bytes) = texels(s, source, MipRule::Sharp, at, view, pixel, lanes) else { return V3::splat(s, flat) };
+    let Some(bytes) = texels(s, source, MipRule::Sharp, at, (view, None), pixel, lanes) else {
+        return V3::splat(s, flat);
+    };
     // Written out: a closure that is not inlined is compiled without the instruction set.
     V3 {
         x: tone::decode_bytes(bytes[0]) * flat[0],
@@ -525,14 +636,15 @@ pub(crate) fn albedo<S: Simd>(
     }
 }
 
-/// The texture's bytes (0..=255) at the surface; `None` without a texture.
+/// The texture's bytes (0..=255) at the surface; `None` without a texture. The rays have their directions and, for exact
+/// widths of pixels, the axes of the image and the distances of the surfaces.
 #[inline(always)]
 fn texels<S: Simd>(
     s: S,
     source: &InstanceSurface<'_>,
     rule: MipRule,
     at: &Surface<S>,
-    view: V3<S>,
+    (view, exact): (V3<S>, Option<([[f32; 3]; 2], F<S>)>),
     pixel: PixelWidth,
     lanes: M<S>,
 ) -> Option<[F<S>; 3]> {
@@ -541,9 +653,23 @@ fn texels<S: Simd>(
     // Width of a pixel on the surface: between its narrow and its wide side for slanted surfaces; the wide side in
     // OpenGL.
     let slant = max(-at.normal.dot(view), splat(s, 0.02));
-    let width = match rule {
-        MipRule::Sharp => pixel.at(s, at.t) / sqrt_or_zero(s, slant),
-        MipRule::OpenGl | MipRule::OpenGlFaces => pixel.at(s, at.t) / slant,
+    let width = match (exact, rule) {
+        (Some((axes, distance)), _) => {
+            // Derivatives of the point by the image coordinates: the larger one counts.
+            let ray = if pixel.parallel { view } else { view.scale(distance / at.t) };
+            let along = -max(-at.normal.dot(ray), splat(s, 1e-3));
+            let square = {
+                #[inline(always)]
+                |axis: [f32; 3]| {
+                    let axis = V3::splat(s, axis);
+                    let moved = axis.sub(ray.scale(at.normal.dot(axis) / along));
+                    moved.dot(moved)
+                }
+            };
+            pixel.at(s, at.t) * max(square(axes[0]), square(axes[1])).sqrt()
+        }
+        (None, MipRule::Sharp) => pixel.at(s, at.t) / sqrt_or_zero(s, slant),
+        (None, MipRule::OpenGl | MipRule::OpenGlFaces) => pixel.at(s, at.t) / slant,
     };
     let scale = source.texture_scale;
     Some(if texture::is_cube(image) {

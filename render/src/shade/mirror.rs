@@ -14,7 +14,7 @@ use crate::trace::{Hit, RayTracer};
 use kinetoscope_scene::Ray;
 use kinetoscope_scene::shape::Shape;
 use kinetoscope_scene::vector::{add_scaled, dot, scale, sub, to_f64};
-use kinetoscope_scene::{Instance, LightingSpace, RenderScene};
+use kinetoscope_scene::{Instance, LightingSpace, Marker, RenderScene};
 use std::cell::RefCell;
 
 /// Largest number of transparent surfaces that a mirrored ray passes.
@@ -262,7 +262,7 @@ impl Mirrors<'_> {
         let (scene, mut at) = (context.shade.scene, SurfaceLanes::EMPTY);
         let display = scene.lighting_space == LightingSpace::Display;
         let blend = context.shade.lighting.blend;
-        let lit = ShadeContext { receives_shadows: scene.opengl.is_none(), ..context.shade };
+        let lit = ShadeContext { receives_shadows: scene.opengl.is_none(), image_axes: None, ..context.shade };
         let mut hit_lanes = 0;
         for _ in 0..MAX_PASSES {
             let mut hits = [None; LANES];
@@ -301,7 +301,13 @@ impl Mirrors<'_> {
                 let here = at.surface(s, distance / length);
                 let [x, y, z] = &directions;
                 let direction = V3 { x: load(s, x), y: load(s, y), z: load(s, z) };
-                let seen = shade(s, &lit, &source, &here, ViewRays { direction, distance }, tint, mask(s, bits));
+                let corners = lit.lighting.polygons.is_in_use().then(|| {
+                    let triangles = hits.map(|hit| hit.map_or(0, |hit| hit.triangle));
+                    let mesh = source.instance.mesh();
+                    lit.lighting.polygons.corners(s, &source, mesh, &triangles, &here, mask(s, bits))
+                });
+                let mirrored = ViewRays { direction, distance };
+                let seen = shade(s, &lit, &source, &here, corners.as_ref(), mirrored, tint, mask(s, bits));
                 let seen = if display {
                     V3 { x: blend.to_bytes(s, seen.x), y: blend.to_bytes(s, seen.y), z: blend.to_bytes(s, seen.z) }
                 } else {
@@ -309,12 +315,14 @@ impl Mirrors<'_> {
                 };
                 let seen = arrays(seen);
                 let alpha = source.instance.material.rgba[3].min(1.0);
+                let is_additive = scene.opengl.is_some_and(|rules| rules.is_additive);
+                let passed = if is_additive && alpha < 1.0 { 1.0 } else { 1.0 - alpha };
                 for k in lanes_of(bits) {
                     let (Some(hit), Some(reflected)) = (&hits[k], &mut rays[k]) else { continue };
                     for (sum, seen) in sum.iter_mut().zip(&seen) {
                         sum[k] += reflected.throughput * alpha * seen[k];
                     }
-                    reflected.throughput *= 1.0 - alpha;
+                    reflected.throughput *= passed;
                     reflected.pass(hit.distance);
                 }
             }
@@ -322,8 +330,8 @@ impl Mirrors<'_> {
         hit_lanes
     }
 
-    /// The next surface along a mirrored ray, without backs of transparent surfaces; `None` without one, and after
-    /// [`MAX_PASSES`] such backs.
+    /// The next surface along a mirrored ray, without backs of transparent surfaces, or any backs that are
+    /// [culled](kinetoscope_scene::OpenGlRules::culls_backs); `None` without one, and after [`MAX_PASSES`] such backs.
     #[inline(always)]
     fn next<S: Simd>(
         &self,
@@ -334,8 +342,9 @@ impl Mirrors<'_> {
     ) -> Option<Hit> {
         for _ in 0..MAX_PASSES {
             let hit = self.tracer.closest_hit(s, &reflected.ray, f64::INFINITY, END_TIME, stack)?;
-            let opaque = scene.instances()[hit.instance as usize].material.rgba[3] >= 1.0;
-            if opaque || dot(hit.normal, reflected.ray.direction) < 0.0 {
+            let instance = &scene.instances()[hit.instance as usize];
+            let culls = scene.opengl.is_some_and(|rules| rules.culls_backs) && instance.group != Marker::GROUP;
+            if instance.material.rgba[3] >= 1.0 && !culls || dot(hit.normal, reflected.ray.direction) < 0.0 {
                 return Some(hit);
             }
             reflected.pass(hit.distance);

@@ -9,6 +9,7 @@ pub(crate) mod light;
 pub(crate) mod mirror;
 pub(crate) mod motion_vectors;
 pub(crate) mod multisample;
+pub(crate) mod polygons;
 pub(crate) mod prepared_frame;
 pub(crate) mod shadow;
 mod shadow_fit;

@@ -2,7 +2,7 @@
 
 use super::group::{Colors, SamplePositions, ShadingContext, resolve};
 use crate::raster::tile::{BLOCK, NO_ID, SAMPLES, Tile};
-use crate::simd::{LANES, Simd, load, load_u, splat_u, store};
+use crate::simd::{LANES, Simd, load, load_u, min, splat, splat_u, store};
 
 /// Largest number of samples that are shaded together.
 const CAPACITY: usize = 1024;
@@ -84,6 +84,8 @@ impl EdgeSamples {
         }
         let group = block * (BLOCK / 2) + row;
         let mut last = 0;
+        // OpenGL computes the color of a surface once per pixel, in its middle: the mean of the samples is near to it.
+        let at_mean = context.shade.scene.opengl.is_some();
         while left != 0 {
             let lane = left.trailing_zeros() as usize;
             left &= left - 1;
@@ -91,8 +93,12 @@ impl EdgeSamples {
             let (center, nearness) = sample(0);
             let (mut own, begin) = (0u8, self.pending.len());
             let mut seen = [0.0f32; SAMPLES.len()];
-            for (plane, offset) in SAMPLES.iter().enumerate().skip(1) {
+            for (plane, offset) in tile.offsets.iter().enumerate().skip(1) {
                 let (id, q) = sample(plane);
+                let at_sample = [
+                    corner[0] + (lane % 8) as f32 + 0.5 + offset[0] as f32 / 256.0,
+                    corner[1] + (2 * row + lane / 8) as f32 + 0.5 + offset[1] as f32 / 256.0,
+                ];
                 if !differ(context, center, id, nearness, q, &mut last) {
                     own += 1;
                     continue;
@@ -102,6 +108,10 @@ impl EdgeSamples {
                     others.find(|(other, seen)| !differ(context, other.id, id, **seen, q, &mut last))
                 {
                     other.weight += 1;
+                    if at_mean {
+                        other.u += at_sample[0];
+                        other.v += at_sample[1];
+                    }
                     continue;
                 }
                 seen[self.pending.len() - begin] = q;
@@ -110,9 +120,15 @@ impl EdgeSamples {
                     lane: lane as u8,
                     weight: 1,
                     id,
-                    u: corner[0] + (lane % 8) as f32 + 0.5 + offset[0] as f32 / 256.0,
-                    v: corner[1] + (2 * row + lane / 8) as f32 + 0.5 + offset[1] as f32 / 256.0,
+                    u: at_sample[0],
+                    v: at_sample[1],
                 });
+            }
+            if at_mean {
+                for request in &mut self.pending[begin..] {
+                    let share = 1.0 / f32::from(request.weight);
+                    (request.u, request.v) = (request.u * share, request.v * share);
+                }
             }
             if own < 4 {
                 for channel in &mut colors[group] {
@@ -177,8 +193,8 @@ pub(crate) fn blend<S: Simd>(
                 share[lane] += each;
                 if id[lane] == NO_ID {
                     id[lane] = sample;
-                    u[lane] += SAMPLES[plane][0] as f32 / 256.0;
-                    v[lane] += SAMPLES[plane][1] as f32 / 256.0;
+                    u[lane] += layer.offsets[plane][0] as f32 / 256.0;
+                    v[lane] += layer.offsets[plane][1] as f32 / 256.0;
                 }
             }
         }
@@ -186,8 +202,13 @@ pub(crate) fn blend<S: Simd>(
     let mut over: Colors = [[0.0; LANES]; 3];
     resolve(s, context, &id, SamplePositions::Points([&u, &v]), None, Some(&mut over));
     let k = load(s, &share) * alpha;
+    let is_additive = context.shade.scene.opengl.is_some_and(|rules| rules.is_additive);
     for (to, from) in colors.iter_mut().zip(&over) {
         let (below, above) = (load(s, to), load(s, from));
-        store(below + (above - below) * k, to);
+        if is_additive {
+            store(min(below + above * k, splat(s, 1.0)), to);
+        } else {
+            store(below + (above - below) * k, to);
+        }
     }
 }

@@ -16,14 +16,14 @@ use crate::geometry::assets::RayAssetCache;
 use crate::geometry::bvh::TraversalStack;
 use crate::lens::rays::LensRays;
 use crate::raster::tile::{BLOCK, SAMPLES};
-use crate::raster::{DrawList, Granularity, Layer, select_level};
+use crate::raster::{DrawList, Granularity, Layer, largest_shift, select_level};
 use crate::renderer::Renderer;
 use crate::request::RasterCfg;
 use crate::request::RenderRequest;
 use crate::shutter::Shutter;
 use crate::trace::RayTracer;
 use crate::visibility::{Projection, RenderError, View};
-use kinetoscope_scene::{Instance, Light, LightingSpace, PoseF32};
+use kinetoscope_scene::{Instance, Light, LightingSpace, PoseF32, RenderScene};
 use std::cell::RefCell;
 
 /// Largest number of lights with a shadow map.
@@ -193,7 +193,7 @@ impl PreparedFrame {
         // Index of the light of each shadow map.
         let mut maps: [Option<usize>; MAX_SHADOWS] = [None; MAX_SHADOWS];
         if cfg.shadows && !self.shadow_rays {
-            let side = shadow_side(cfg, view);
+            let side = shadow_side(cfg, view, scene);
             let light_sources = lights.iter().enumerate().filter(|(_, l)| l.active).take(MAX_LIGHTS);
             let mut views = [None; MAX_LIGHTS];
             let mut casting = [0; MAX_LIGHTS];
@@ -302,6 +302,10 @@ impl PreparedFrame {
                 eye: (projection.parallel && render_request.scene.opengl.is_some())
                     .then_some(projection.world_from_camera.translation),
                 receives_shadows: true,
+                image_axes: render_request.scene.opengl.is_some().then(|| {
+                    let rotation = projection.world_from_camera.rotation;
+                    [0, 1].map(|axis| rotation.map(|row| row[axis]))
+                }),
             },
             mirrors,
             surface,
@@ -360,9 +364,11 @@ fn check_lens(lens: &LensRays, renderer: Renderer, view: &View, samples: u8) -> 
 }
 
 /// Texels along the side of a shadow map: as configured, or, for 0, about three texels for two pixels of a square image
-/// of the same area.
-fn shadow_side(cfg: RasterCfg, view: &View) -> usize {
+/// of the same area, and four times as many for scenes with the rules of MuJoCo's OpenGL renderer.
+fn shadow_side(cfg: RasterCfg, view: &View, scene: &RenderScene) -> usize {
+    let size = view.width.saturating_mul(view.height).isqrt();
     match cfg.shadow_size {
+        0 if scene.opengl.is_some() => (size.min(512) * 6).next_power_of_two().clamp(512, 2048),
         0 => (view.width.saturating_mul(view.height).isqrt().min(1024) * 3 / 2).next_power_of_two().clamp(128, 1024),
         n => n.clamp(64, 8192).next_multiple_of(BLOCK),
     }
@@ -375,9 +381,10 @@ fn triangle_count(cfg: RasterCfg, render_request: &RenderRequest<'_>) -> usize {
         return scene.triangle_count();
     }
     let projection = Projection::from(view);
+    let shift = largest_shift(scene, &projection);
     let count = |(instance, pose): (&Instance, &PoseF32)| {
         let mesh = instance.mesh().filter(|_| Layer::for_instance(instance, cfg.groups) != Layer::Hidden)?;
-        let level = select_level(&projection, instance, &view.world_from_camera.inverse_times(pose));
+        let level = select_level(&projection, instance, &view.world_from_camera.inverse_times(pose), shift);
         Some(mesh.level(usize::from(level)).triangles().len())
     };
     scene.instances().iter().zip(poses).filter_map(count).sum()
@@ -389,7 +396,7 @@ pub(crate) fn estimate_cost_ns(cfg: RasterCfg, render_request: &RenderRequest<'_
     let wants_color = frame.wants(Stage::Color);
     let (pixels, triangles) = (view.width.saturating_mul(view.height), triangle_count(cfg, render_request));
     let shadows = if wants_color && cfg.shadows {
-        let texels = shadow_side(cfg, view).pow(2);
+        let texels = shadow_side(cfg, view, scene).pow(2);
         scene.lights.len().min(MAX_SHADOWS) * (2 * texels + 20 * triangles) + 5 * pixels
     } else {
         0

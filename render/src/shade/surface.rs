@@ -5,7 +5,7 @@ use crate::raster::PlacedInstance;
 use crate::simd::{F, LANES, M, Simd, U, V3, load, max, min, select, splat};
 use crate::visibility::{Projection, primitive};
 use kinetoscope_scene::shape::{RenderMesh, Shape};
-use kinetoscope_scene::{Instance, PoseF32};
+use kinetoscope_scene::{Instance, PlaneLines, PoseF32};
 
 /// Surfaces at sixteen samples.
 #[derive(Clone, Copy)]
@@ -56,6 +56,8 @@ pub(crate) struct InstanceSurface<'a> {
     pub(crate) texture_scale: [f32; 3],
     /// Texture coordinates at the origin, see [`kinetoscope_scene::RenderScene::texture_offsets`].
     pub(crate) texture_offset: [f32; 2],
+    /// Polygons of a plane, see [`kinetoscope_scene::RenderScene::plane_lines`].
+    pub(crate) plane_lines: [PlaneLines; 2],
 }
 
 /// Sixteen rays through a lens that bends them.

@@ -5,25 +5,50 @@ use super::harness::{Image, TestFrame};
 use crate::renderer::Renderer;
 use crate::shade::tone::ToneCurve;
 use crate::visibility::View;
-use kinetoscope_scene::shape::{Box, Plane, Shape};
-use kinetoscope_scene::{Haze, Light, LightingSpace, Material, OpenGlRules, PoseF32, Texture, TextureKind};
+use kinetoscope_scene::shape::{Box, Cylinder, Mesh, Plane, Shape, Sphere};
+use kinetoscope_scene::{
+    Haze, Light, LightKind, LightingSpace, Material, OpenGlRules, PlaneLines, PoseF32, Tessellation, Texture,
+    TextureKind,
+};
 use kinetoscope_testkit::scenes::{instances, matte, translation, unlit};
 use std::sync::Arc;
 
-const RULES: OpenGlRules = OpenGlRules { shadow_clip: 10.0, shadow_scale: 1.0 };
+const RULES: OpenGlRules =
+    OpenGlRules { shadow_clip: 10.0, shadow_scale: 1.0, culls_backs: false, is_additive: false, tessellation: None };
 const SIZE: usize = 65;
 
 /// A floor of this material below a plate, from above; 20 pixels are 1 m.
 fn floor_and_plate(floor: Material, opengl: Option<OpenGlRules>, lights: Vec<Light>) -> TestFrame {
-    let plate = Shape::from(Box { half: [0.5, 0.5, 0.01] });
-    let (scene, poses) = instances([
-        (Shape::from(Plane { half: [3.0; 2] }), floor, PoseF32::IDENTITY),
-        (plate, matte([0.5; 3]), translation(-2.0, 0.0, 1.0)),
-    ]);
+    floor_and((plate(), matte([0.5; 3]), translation(-2.0, 0.0, 1.0)), floor, opengl, lights)
+}
+
+fn plate() -> Shape {
+    Box { half: [0.5, 0.5, 0.01] }.into()
+}
+
+/// A floor of this material below another object, from above; 20 pixels are 1 m.
+fn floor_and(
+    object: (Shape, Material, PoseF32),
+    floor: Material,
+    opengl: Option<OpenGlRules>,
+    lights: Vec<Light>,
+) -> TestFrame {
+    let floor = (Shape::from(Plane { half: [3.0; 2] }), floor, PoseF32::IDENTITY);
+    let down = View::look_at([SIZE; 2], 0.5, [0.0, 0.0, 3.0], [0.0; 3], [0.0, 1.0, 0.0]).unwrap();
+    still([floor, object], opengl, lights, down)
+}
+
+/// Objects from a camera with parallel rays; 20 pixels are 1 m.
+fn still(
+    objects: impl IntoIterator<Item = (Shape, Material, PoseF32)>,
+    opengl: Option<OpenGlRules>,
+    lights: Vec<Light>,
+    view: View,
+) -> TestFrame {
+    let (scene, poses) = instances(objects);
     let mut scene = unlit(scene);
     (scene.lighting_space, scene.opengl, scene.lights) = (LightingSpace::Display, opengl, lights);
-    let down = View::look_at([SIZE; 2], 0.5, [0.0, 0.0, 3.0], [0.0; 3], [0.0, 1.0, 0.0]).unwrap();
-    let view = View { parallel: true, fx: 20.0, fy: 20.0, ..down };
+    let view = View { parallel: true, fx: 20.0, fy: 20.0, ..view };
     TestFrame::new((scene, poses), view).with(|still| still.cfg.tone = ToneCurve::Clip)
 }
 
@@ -125,4 +150,207 @@ fn haze() {
         assert!((found - expected).abs() < 0.008, "{distance}: {found} {expected}");
         assert!((control - expected).abs() > 0.02, "{distance}: {control} {expected}");
     }
+}
+
+/// A directional light casts shadows in a square around its axis only. The axis goes from (-4, 0, 3) along (2, 0, -1), so
+/// that a point (x, 0, 0) of the floor is (x - 2) / sqrt(5) beside it.
+#[test]
+fn shadows_of_the_sun_end() {
+    let draw = |clip: f32| {
+        let rules = OpenGlRules { shadow_clip: clip, ..RULES };
+        floor_and_plate(matte([0.5; 3]), Some(rules), vec![sun(0.8, 0.0)]).draw()
+    };
+    // The plate shades x = -0.5 to 0.5 and y = -0.5 to 0.5; with this square, x = -0.125 and y = 0.3 are the ends.
+    let lit = 0.5 * 0.8 * COSINE;
+    let narrow = draw(0.95);
+    for (x, expected) in [(-0.45, lit), (-0.2, lit), (-0.05, 0.0), (0.4, 0.0), (0.6, lit)] {
+        assert_red(&narrow, [x, 0.0], expected);
+    }
+    assert_red(&draw(10.0), [-0.2, 0.0], 0.0);
+    // Across, the plane of the axis is y = 0. The square is as wide: it must contain x = 0.4, which is 0.716 away.
+    let square = draw(0.75);
+    for (y, expected) in [(0.0, 0.0), (0.45, 0.0), (0.6, lit)] {
+        assert_red(&square, [0.4, y], expected);
+    }
+    assert_red(&square, [0.2, 0.0], lit);
+}
+
+/// A spot casts shadows in a fraction of its cutoff angle only. It is 3 m above the floor, so that a plate at half the
+/// height, from x = 0 to 1, shades x = 0 to 1.5.
+#[test]
+fn shadows_of_a_spot_end() {
+    let spot = Light {
+        kind: LightKind::Spot { cutoff_deg: 45.0, exponent: 0.0 },
+        position: [0.0, 0.0, 3.0],
+        direction: [0.0, 0.0, -1.0],
+        attenuation: [1.0, 0.0, 0.0],
+        ..sun(0.8, 0.0)
+    };
+    let draw = |scale: f32| {
+        let rules = OpenGlRules { shadow_scale: scale, ..RULES };
+        let object = (plate(), matte([0.5; 3]), translation(0.5, 0.0, 1.0));
+        floor_and(object, matte([0.5; 3]), Some(rules), vec![spot]).draw()
+    };
+    let lit = |x: f32| 0.5 * 0.8 * 3.0 / (9.0 + x * x).sqrt();
+    // 3 m tan(22.5 deg) = 1.243 m.
+    let (half, whole) = (draw(0.5), draw(1.0));
+    for (x, expected) in [(1.1, 0.0), (1.4, lit(1.4)), (-0.3, lit(0.3))] {
+        assert_red(&half, [x, 0.0], expected);
+    }
+    assert_red(&whole, [1.1, 0.0], 0.0);
+    assert_red(&whole, [1.4, 0.0], 0.0);
+}
+
+/// Transparent surfaces receive no shadows, are lit by all lights, cast shadows, and are mixed as display colors.
+///
+/// The pane, of opacity 0.4, is in the shadow of the plate, and the floor below it too.
+#[test]
+fn transparent_surfaces() {
+    let pane = Material { rgba: [0.9, 0.9, 0.9, 0.4], ..matte([0.9; 3]) };
+    let draw = |opengl: Option<OpenGlRules>, plate_at: f32| {
+        let floor = (Shape::from(Plane { half: [3.0; 2] }), matte([0.5; 3]), PoseF32::IDENTITY);
+        let shade = (plate(), matte([0.5; 3]), translation(plate_at, 0.0, 1.0));
+        let glass = (Box { half: [0.3, 0.3, 0.01] }.into(), pane.clone(), translation(0.0, 0.0, 0.2));
+        let down = View::look_at([SIZE; 2], 0.5, [0.0, 0.0, 3.0], [0.0; 3], [0.0, 1.0, 0.0]).unwrap();
+        still([floor, shade, glass], opengl, vec![sun(0.8, 0.0)], down).draw()
+    };
+    let lit = 0.8 * COSINE;
+    let shaded = draw(Some(RULES), -2.0);
+    assert_red(&shaded, SHADOW, 0.4 * 0.9 * lit);
+    assert_red(&draw(None, -2.0), SHADOW, 0.0);
+    // Without the plate, the pane alone shades the floor, 0.4 m to its right.
+    let alone = draw(Some(RULES), -20.0);
+    assert_red(&alone, [0.2, 0.0], 0.4 * 0.9 * lit);
+    assert_red(&alone, [0.5, 0.0], 0.0);
+    assert_red(&alone, [-0.25, 0.0], 0.4 * 0.9 * lit + 0.6 * 0.5 * lit);
+    // Additive: nothing is lost behind the pane.
+    let added = draw(Some(OpenGlRules { is_additive: true, ..RULES }), -20.0);
+    assert_red(&added, [-0.25, 0.0], 0.4 * 0.9 * lit + 0.5 * lit);
+}
+
+/// A mirror shows surfaces without shadows on them, in colors multiplied by the reflectance and added to its own.
+///
+/// Seen along (1, 0, -1), the floor at (1, 0, 0) mirrors the wall x = 2 at the height 1, which is in the shadow of a plate.
+#[test]
+fn reflections_have_no_shadows() {
+    const WALL: f32 = 0.6;
+    const REFLECTANCE: f32 = 0.5;
+    let draw = |opengl: Option<OpenGlRules>, target: [f32; 3], reflectance: f32| {
+        let mirror = Material { reflectance, ..matte([0.3; 3]) };
+        let objects = [
+            (Shape::from(Plane { half: [3.0; 2] }), mirror, PoseF32::IDENTITY),
+            (Box { half: [0.05, 1.0, 1.0] }.into(), matte([WALL; 3]), translation(2.05, 0.0, 1.0)),
+            (Box { half: [0.02, 0.3, 0.3] }.into(), matte([0.5; 3]), translation(0.0, 0.0, 2.0)),
+        ];
+        let eye = [target[0] - 2.0, 0.0, target[2] + 2.0];
+        let view = View::look_at([SIZE; 2], 0.5, eye, target, [0.0, 0.0, 1.0]).unwrap();
+        let image = still(objects, opengl, vec![sun(0.8, 0.0)], view).draw();
+        f32::from(image.color()[SIZE / 2 * SIZE + SIZE / 2][0]) / 255.0
+    };
+    let (floor, wall) = ([1.0, 0.0, 0.0], [2.0, 0.0, 1.0]);
+    // The light falls onto the wall at twice the tangent.
+    let (own, mirrored) = (0.3 * 0.8 * COSINE, WALL * 0.8 * 2.0 * COSINE);
+    let near = |found: f32, expected: f32| assert!((found - expected).abs() < 0.006, "{found} {expected}");
+    near(draw(Some(RULES), wall, REFLECTANCE), 0.0);
+    near(draw(Some(RULES), [2.0, 0.0, 1.6], REFLECTANCE), mirrored);
+    near(draw(Some(RULES), floor, REFLECTANCE), own + REFLECTANCE * mirrored);
+    near(draw(Some(RULES), floor, 0.0), own);
+    near(draw(None, floor, REFLECTANCE), own);
+}
+
+/// A camera inside of a solid sees through it if backs are culled. The wall is 2 m before the camera.
+#[test]
+fn culled_backs() {
+    let ball = kinetoscope_scene::shape::RenderMesh::new(&Shape::from(Sphere { radius: 0.5 }).tessellate(16), 0.5);
+    let solids: [Shape; 4] = [
+        Box { half: [0.5; 3] }.into(),
+        Sphere { radius: 0.5 }.into(),
+        Cylinder { radius: 0.5, half_length: 0.4 }.into(),
+        Mesh { mesh: Arc::new(ball) }.into(),
+    ];
+    for solid in solids {
+        let name = solid.name();
+        let draw = |culls_backs: bool, from: f32| {
+            let wall = (Shape::from(Box { half: [0.1, 9.0, 9.0] }), matte([0.5; 3]), translation(2.1, 0.0, 0.0));
+            let object = (solid.clone(), matte([0.5; 3]), PoseF32::IDENTITY);
+            let rules = OpenGlRules { culls_backs, ..RULES };
+            let view = View::look_at([SIZE; 2], 0.5, [from, 0.0, 0.0], [2.0, 0.0, 0.0], [0.0, 0.0, 1.0]).unwrap();
+            let mut frame = still([object, wall], Some(rules), vec![sun(0.8, 0.0)], view);
+            frame.view = view;
+            let image = frame.draw();
+            let middle = SIZE / 2 * SIZE + SIZE / 2;
+            (image.mask()[middle], image.depth()[middle])
+        };
+        for (culls, from, mask, depth) in [(true, 0.0, 2, 2.0), (false, 0.0, 1, 0.5), (true, -2.0, 1, 1.5)] {
+            let (found, at) = draw(culls, from);
+            assert!(found == mask && (at - depth).abs() < 0.02, "{name} {culls} {from}: {found} at {at}");
+        }
+    }
+}
+
+/// Light is computed at the corners of polygons and interpolated: between the corners (0, 0), (2, 0) and (0, 2) of a floor,
+/// below a light at (0, 0, 3).
+#[test]
+fn light_at_corners() {
+    let light = Light {
+        kind: LightKind::Point,
+        position: [0.0, 0.0, 3.0],
+        attenuation: [1.0, 0.0, 0.0],
+        cast_shadow: false,
+        ..sun(0.9, 0.0)
+    };
+    let lines = [PlaneLines { reach: 2.0, step: 2.0, border: 3.0 }; 2];
+    let draw = |tessellation: Option<Tessellation>| {
+        let rules = OpenGlRules { tessellation, ..RULES };
+        let far = (plate(), matte([0.5; 3]), translation(-20.0, 0.0, 1.0));
+        let mut frame = floor_and(far, matte([0.5; 3]), Some(rules), vec![light]);
+        frame.scene.set_plane_lines(0, lines);
+        frame.draw()
+    };
+    let lit = |square: f32| 0.5 * 0.9 * 3.0 / (9.0 + square).sqrt();
+    let (corners, pixels) = (draw(Some(Tessellation::default())), draw(None));
+    // Points with their shares of the corners (0, 0) and, together, of the other two, which are as bright.
+    for (x, y, share) in [(0.5, 0.5, 0.5), (0.25, 0.75, 0.5), (1.0, 1.0, 0.0), (1.2, 0.0, 0.4)] {
+        assert_red(&corners, [x, y], share * lit(0.0) + (1.0 - share) * lit(4.0));
+        assert_red(&pixels, [x, y], lit(x * x + y * y));
+    }
+    // The formulas differ: where a corner is, they agree, in the middle of a polygon they do not.
+    let middle = |image: &Image| red(image, 1.2, 0.0);
+    assert!(middle(&pixels) - middle(&corners) > 2.0, "{} {}", middle(&pixels), middle(&corners));
+}
+
+/// Light at the corners of triangles of a mesh and of a box: the same colors as of the shape as a mesh with those
+/// triangles, which has another code.
+#[test]
+fn corners_of_meshes() {
+    let light = Light {
+        kind: LightKind::Point,
+        position: [1.0, 0.5, 2.0],
+        attenuation: [0.5, 0.2, 0.1],
+        cast_shadow: false,
+        specular: [0.6; 3],
+        ..sun(0.7, 0.1)
+    };
+    let half = [0.8, 0.5, 0.2];
+    let quality = Tessellation { quads: 1, ..Tessellation::default() };
+    let draw = |shape: Shape, quality: Tessellation| {
+        let rules = OpenGlRules { tessellation: Some(quality), ..RULES };
+        let shiny = Material { specular: 0.8, shininess: 0.2, ..matte([0.5; 3]) };
+        floor_and((shape, shiny, translation(0.0, 0.0, 0.5)), matte([0.5; 3]), Some(rules), vec![light]).draw()
+    };
+    // The upper face, split like OpenGL splits it.
+    let corner = |x: f32, y: f32| [x * half[0], y * half[1], half[2]];
+    let positions = vec![corner(-1., -1.), corner(1., -1.), corner(1., 1.), corner(-1., 1.)];
+    let mesh = kinetoscope_scene::mesh::TriMesh::from_triangles(positions, vec![[0, 1, 3], [1, 2, 3]]);
+    let mesh = kinetoscope_scene::shape::RenderMesh::new(&mesh, 0.5);
+    let boxed = draw(Box { half }.into(), quality);
+    let flat = draw(Mesh { mesh: Arc::new(mesh) }.into(), quality);
+    let fine = draw(Box { half }.into(), Tessellation { quads: 50, ..quality });
+    let upper = |image: &Image| -> Vec<u8> {
+        let points = (-15..=15).flat_map(|x| (-9..=9).map(move |y| (x as f32 * 0.05, y as f32 * 0.05)));
+        points.map(|(x, y)| red(image, x, y) as u8).collect()
+    };
+    let (a, b, control) = (upper(&boxed), upper(&flat), upper(&fine));
+    assert!(a.iter().zip(&b).all(|(a, b)| a.abs_diff(*b) <= 1), "{a:?} {b:?}");
+    assert!(a.iter().zip(&control).any(|(a, c)| a.abs_diff(*c) > 8), "the control: other polygons");
 }

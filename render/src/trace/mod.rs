@@ -12,7 +12,7 @@
 mod instance_bvh;
 pub(crate) mod motion;
 
-use super::raster::tile::{BLOCK, BLOCK_AREA, NO_ID, SAMPLES, Tile};
+use super::raster::tile::{BLOCK, BLOCK_AREA, NO_ID, Tile};
 use super::raster::{DrawItem, Layer, PlacedInstance};
 use crate::geometry::assets::{AssetCache, RayAssetCache};
 use crate::geometry::bvh::TraversalStack;
@@ -370,7 +370,8 @@ impl RayTracer {
                         }
                         tile.prepare_block(block);
                         let mut drawn = false;
-                        for (plane, offset) in SAMPLES.iter().enumerate().take(tile.planes) {
+                        let offsets = tile.offsets;
+                        for (plane, offset) in offsets.iter().enumerate().take(tile.planes) {
                             let [dx, dy] = offset.map(|x| f64::from(x) / 256.0 + 0.5);
                             let samples = tile.samples(block, plane);
                             let (side, parts) = if tile.only_row.is_some() {
