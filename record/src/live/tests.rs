@@ -23,7 +23,7 @@ use tungstenite::{Message, WebSocket};
 const MESSAGE: u8 = 1;
 const TIME: u8 = 2;
 
-/// What a server sends.
+/// Messages of a server.
 #[derive(Debug)]
 enum Received {
     Text(Value),
@@ -147,7 +147,8 @@ fn same_messages_as_a_recording() {
     client.subscribe();
     let (channels, from) = client.read();
     let topic = |k: usize| channels[k]["topic"].as_str().unwrap().to_string();
-    let (mut got, mut times): (Vec<(String, u64, Vec<u8>)>, Vec<u64>) = (Vec::new(), Vec::new());
+    let mut got = Vec::<(String, u64, Vec<u8>)>::new();
+    let mut times = Vec::<u64>::new();
     let mut topics = BTreeSet::new();
     let mut step = 0;
     while topics.len() < count {

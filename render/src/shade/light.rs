@@ -556,7 +556,7 @@ fn light_at_corners<S: Simd>(
                 let light = &prepared.light;
                 let own_pass = prepared.own_pass && receives_shadows;
                 let mut pass = V3::splat(s, [0.0; 3]);
-                for corner in 0..3 {
+                for (corner, sum) in sums.iter_mut().enumerate() {
                     let position = corners.positions[corner];
                     let normal = corners.normals[corner].scale(side);
                     let Some((to, strength)) = prepared.illumination(s, position, lanes) else { continue };
@@ -585,7 +585,7 @@ fn light_at_corners<S: Simd>(
                         let lit = V3 { x: min(lit.x, one), y: min(lit.y, one), z: min(lit.z, one) };
                         pass = pass.add(lit.scale(corners.shares[corner]));
                     } else {
-                        sums[corner] = sums[corner].add(lit);
+                        *sum = sum.add(lit);
                     }
                 }
                 if !own_pass {
@@ -636,6 +636,10 @@ pub(crate) fn albedo<S: Simd>(
     }
 }
 
+/// Axes of the image in the world, right and down, and the distance of the surface along the ray \[m\]: exact widths of
+/// pixels follow from them.
+type ExactWidth<S> = ([[f32; 3]; 2], F<S>);
+
 /// The texture's bytes (0..=255) at the surface; `None` without a texture. The rays have their directions and, for exact
 /// widths of pixels, the axes of the image and the distances of the surfaces.
 #[inline(always)]
@@ -644,7 +648,7 @@ fn texels<S: Simd>(
     source: &InstanceSurface<'_>,
     rule: MipRule,
     at: &Surface<S>,
-    (view, exact): (V3<S>, Option<([[f32; 3]; 2], F<S>)>),
+    (view, exact): (V3<S>, Option<ExactWidth<S>>),
     pixel: PixelWidth,
     lanes: M<S>,
 ) -> Option<[F<S>; 3]> {
