@@ -459,7 +459,7 @@ class DiscreteObstaclesTerrain:
 
 @dataclass(kw_only=True, slots=True)
 class RoughTile:
-    """Numbers of a rough tile. Pairs are [easiest, hardest]."""
+    """Parameters of a rough tile. Pairs are [easiest, hardest]."""
 
     amplitude: Sequence[float] = (0.02, 0.1)
     """Largest height above and below 0 [m]."""
@@ -470,7 +470,7 @@ class RoughTile:
 
 @dataclass(kw_only=True, slots=True)
 class SlopeTile:
-    """Numbers of a tile of slopes. Pairs are [easiest, hardest]."""
+    """Parameters of a tile of slopes. Pairs are [easiest, hardest]."""
 
     gradient: Sequence[float] = (0.0, 0.4)
     """Rise per meter: the tangent of the angle."""
@@ -478,7 +478,7 @@ class SlopeTile:
 
 @dataclass(kw_only=True, slots=True)
 class StairsTile:
-    """Numbers of a tile of stairs. Pairs are [easiest, hardest]."""
+    """Parameters of a tile of stairs. Pairs are [easiest, hardest]."""
 
     step_height: Sequence[float] = (0.05, 0.23)
     """Height of a step [m]."""
@@ -489,7 +489,7 @@ class StairsTile:
 
 @dataclass(kw_only=True, slots=True)
 class BoxesTile:
-    """Numbers of a tile of boxes. Pairs are [easiest, hardest]."""
+    """Parameters of a tile of boxes. Pairs are [easiest, hardest]."""
 
     height: Sequence[float] = (0.05, 0.2)
     """Largest height above and below 0 [m]."""
@@ -500,7 +500,7 @@ class BoxesTile:
 
 @dataclass(kw_only=True, slots=True)
 class SteppingStonesTile:
-    """Numbers of a tile of stepping stones. Pairs are [easiest, hardest]."""
+    """Parameters of a tile of stepping stones. Pairs are [easiest, hardest]."""
 
     stone: Sequence[float] = (0.8, 0.3)
     """Side of a stone [m]."""
@@ -514,7 +514,7 @@ class SteppingStonesTile:
 
 @dataclass(kw_only=True, slots=True)
 class GapTile:
-    """Numbers of a tile with a trench. Pairs are [easiest, hardest]."""
+    """Parameters of a tile with a trench. Pairs are [easiest, hardest]."""
 
     width: Sequence[float] = (0.2, 0.8)
     """Width of the trench [m]."""
@@ -525,7 +525,7 @@ class GapTile:
 
 @dataclass(kw_only=True, slots=True)
 class WavesTile:
-    """Numbers of a tile of waves. Pairs are [easiest, hardest]."""
+    """Parameters of a tile of waves. Pairs are [easiest, hardest]."""
 
     amplitude: Sequence[float] = (0.02, 0.2)
     """Largest height above and below 0 [m]."""
@@ -536,7 +536,7 @@ class WavesTile:
 
 @dataclass(kw_only=True, slots=True)
 class ObstaclesTile:
-    """Numbers of a tile of obstacles. The height is [easiest, hardest]."""
+    """Parameters of a tile of obstacles. The height is [easiest, hardest]."""
 
     height: Sequence[float] = (0.05, 0.2)
     """Height of the obstacles [m]."""
@@ -563,8 +563,9 @@ class TileShare:
 class TerrainGrid:
     """A grid of terrain tiles: a type for each column, a difficulty for each row, for curricula of walking robots.
 
-    Rows are along x and columns along y, both from the negative ends. Row 0 is the easiest one. All tiles meet at
-    height 0: the points between two tiles, and those of a flat border around the grid, have this height.
+    Rows are along x and columns along y, both from the negative ends. Row 0 has the first difficulty, by default the
+    easiest. All tiles meet at height 0: the points between two tiles, and those of a flat border around the grid, have
+    this height.
     """
 
     tile_size: Sequence[float] = (8.0, 8.0)
