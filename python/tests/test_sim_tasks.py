@@ -204,7 +204,7 @@ def test_groups_and_images():
     assert (task.images("critic", "view") != task.images("critic", "view", final=True)).any()
     for call, word in [
         (lambda: task.observations("crtic"), "critic"),
-        (lambda: task.images("critic", "vie"), "view"),
+        (lambda: task.images("critic", "vieW"), "view"),
         (lambda: task.group_space("x"), "policy"),
     ]:
         with pytest.raises(ks.UnknownNameError, match=word):
@@ -268,7 +268,7 @@ def test_curricula_on_a_terrain_grid():
     dog.write_root_pose(moved)
     task.step(np.zeros((4, 12)))
     np.testing.assert_array_equal(task.curriculum("level"), [1, 2, 0, 1])
-    for name, values, error in [("leve", [0] * 4, ks.UnknownNameError), ("level", [0], ks.ArgumentError)]:
+    for name, values, error in [("lev", [0] * 4, ks.UnknownNameError), ("level", [0], ks.ArgumentError)]:
         with pytest.raises(error, match="level"):
             task.set_curriculum(name, values)
 
