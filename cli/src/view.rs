@@ -90,9 +90,9 @@ pub(crate) fn run(args: &Args) -> Result<CommandStatus> {
             .start(&mut sim)
             .map_err(|error| format!("--record {error}"))?;
     }
-    if let Some(address) = &args.foxglove {
-        stream_to_foxglove(&mut sim, address).map_err(|error| format!("--foxglove: {error}"))?;
-    }
+    let with_flag = |error| format!("--foxglove: {error}");
+    let stream = args.foxglove.as_deref().map(|address| stream_to_foxglove(&mut sim, address));
+    let end_stream = stream.transpose().map_err(with_flag)?;
     let window = args.open_view(&mut sim, RecordButton::shared(Arc::clone(&files)))?;
     let closed = || window.as_ref().and_then(Window::closed);
     let mut step = 0;
@@ -103,6 +103,9 @@ pub(crate) fn run(args: &Args) -> Result<CommandStatus> {
     let recorded = files.lock().unwrap_or_else(PoisonError::into_inner).finish(&mut sim);
     for recorded in recorded.map_err(|error| format!("--record {error}"))? {
         println!("Recorded to {recorded}");
+    }
+    if let Some(end) = end_stream {
+        end(&mut sim).map_err(with_flag)?;
     }
     if let Some(reason) = closed().as_ref().and_then(Closed::error) {
         return Err(format!("the window was lost after {step} steps: {reason}").into());
@@ -142,21 +145,24 @@ impl Args {
     }
 }
 
-/// Streams the simulation to Foxglove.
+/// Ends a stream to Foxglove. Its error is the one that had stopped the stream.
+type EndStream = Box<dyn FnOnce(&mut SimulationManager) -> Result<()>>;
+
+/// Streams the simulation to Foxglove until the returned function is called.
 ///
 /// # Errors
 /// The address is invalid or in use, or there is nothing to stream.
 #[cfg(feature = "foxglove")]
-fn stream_to_foxglove(sim: &mut SimulationManager, address: &str) -> Result<()> {
+fn stream_to_foxglove(sim: &mut SimulationManager, address: &str) -> Result<EndStream> {
     use kinetoscope::record::{FoxgloveCfg, StreamToFoxglove as _};
     let server = sim.stream_to_foxglove(FoxgloveCfg::at(address)?)?;
     println!("Open {} in Foxglove (Open connection, Foxglove WebSocket)", server.url());
-    Ok(())
+    Ok(Box::new(move |sim| Ok(server.close(sim)?)))
 }
 
 /// Always fails: this build has no streams.
 #[cfg(not(feature = "foxglove"))]
-fn stream_to_foxglove(_: &mut SimulationManager, _: &str) -> Result<()> {
+fn stream_to_foxglove(_: &mut SimulationManager, _: &str) -> Result<EndStream> {
     Err("this build does not stream to Foxglove: build with `--features foxglove`".into())
 }
 

@@ -36,9 +36,8 @@ mod recorded {
         /// The file cannot be written, its format cannot hold any stream of this example, or the address of `--foxglove`
         /// is invalid or in use.
         pub(crate) fn start_recording(&self, sim: &mut SimulationManager) -> Result<Recording> {
-            if let Some(address) = &self.foxglove {
-                stream_to_foxglove(sim, address).map_err(|error| format!("--foxglove: {error}"))?;
-            }
+            let stream = self.foxglove.as_deref().map(|address| stream_to_foxglove(sim, address));
+            let end_stream = stream.transpose().map_err(|error| format!("--foxglove: {error}"))?;
             let files = self.recording();
             if self.record.is_some() {
                 let begun = files.lock().unwrap_or_else(PoisonError::into_inner).start(sim);
@@ -49,20 +48,23 @@ mod recorded {
                     reported: false,
                 });
             }
-            Ok(Recording { files: Arc::clone(files) })
+            Ok(Recording { files: Arc::clone(files), end_stream })
         }
     }
 
+    /// Ends a stream to Foxglove. Its error is the one that had stopped the stream.
+    type EndStream = Box<dyn Fn(&mut SimulationManager) -> Result>;
+
     #[cfg(feature = "foxglove")]
-    fn stream_to_foxglove(sim: &mut SimulationManager, address: &str) -> Result {
+    fn stream_to_foxglove(sim: &mut SimulationManager, address: &str) -> Result<EndStream> {
         use kinetoscope::record::{FoxgloveCfg, StreamToFoxglove as _};
         let server = sim.stream_to_foxglove(FoxgloveCfg::at(address)?)?;
         println!("Open {} in Foxglove (Open connection, Foxglove WebSocket)", server.url());
-        Ok(())
+        Ok(Box::new(move |sim| Ok(server.close(sim)?)))
     }
 
     #[cfg(not(feature = "foxglove"))]
-    fn stream_to_foxglove(_: &mut SimulationManager, _: &str) -> Result {
+    fn stream_to_foxglove(_: &mut SimulationManager, _: &str) -> Result<EndStream> {
         Err("this build does not stream to Foxglove: build with `--features foxglove`".into())
     }
 
@@ -88,8 +90,9 @@ mod recorded {
     }
 
     impl Observer for FailureMonitor {
-        fn due_in(&self, _: &SimulationManager) -> u64 {
-            if self.reported { u64::MAX } else { CHECK_INTERVAL }
+        fn due_in(&self, sim: &SimulationManager) -> u64 {
+            // Counted from the steps of the simulation: each call of `update` asks again.
+            if self.reported { u64::MAX } else { CHECK_INTERVAL - sim.observers().steps() % CHECK_INTERVAL }
         }
 
         fn on_event(&mut self, sim: &mut SimulationManager, _: &SimEvent) {
@@ -109,23 +112,25 @@ mod recorded {
     /// Steps between two looks at the clock.
     const CHECK_INTERVAL: u64 = 10;
 
-    /// The recording that `--record` or the record button has begun, if any.
-    #[derive(Debug)]
+    /// The recording that `--record` or the record button has begun, and the stream of `--foxglove`, if any.
     pub(crate) struct Recording {
         files: Arc<Mutex<FileRecording>>,
+        end_stream: Option<EndStream>,
     }
 
     impl Recording {
-        /// Ends the recording and completes the file.
+        /// Ends the recording and the stream, and completes the file.
         ///
         /// # Errors
-        /// The file could not be written.
+        /// The file could not be written, or the stream had stopped.
         pub(crate) fn finish(&self, sim: &mut SimulationManager) -> Result {
             let ended = self.files.lock().unwrap_or_else(PoisonError::into_inner).finish(sim);
             for recorded in ended.map_err(|error| format!("--record {error}"))? {
                 println!("Recorded to {recorded}");
             }
-            Ok(())
+            self.end_stream
+                .as_ref()
+                .map_or(Ok(()), |end| end(sim).map_err(|error| format!("--foxglove: {error}").into()))
         }
     }
 }

@@ -114,7 +114,8 @@ impl StreamToFoxglove for SimulationManager {
             let messages = RosWriter::create(sink, streams, &sim.cfg().env_origins(), start)?;
             Ok(Box::new(FoxgloveWriter::new(messages, clients)))
         })?;
-        let observer = self.observers_mut().add(FoxgloveObserver { recorder, server: Arc::clone(&server) });
+        let observer =
+            self.observers_mut().add(FoxgloveObserver { recorder, server: Arc::clone(&server), has_failed: false });
         tracing::info!(target: "kinetoscope_record", %address, "streaming to Foxglove");
         Ok(FoxgloveServer { server, observer })
     }
@@ -142,6 +143,18 @@ impl FoxgloveServer {
     /// Number of connected clients; 0 after the stream has ended.
     pub fn clients(&self) -> usize {
         self.server.clients()
+    }
+
+    /// Error that stopped the stream: all clients are disconnected then. `None` while it goes on.
+    ///
+    /// # Errors
+    /// The stream was closed.
+    ///
+    /// # Panics
+    /// The stream belongs to another simulation.
+    #[track_caller]
+    pub fn failure(&self, sim: &SimulationManager) -> kinetoscope_sim::Result<Option<String>> {
+        sim.observers().get(self.observer).map(|observer| observer.recorder.failure())
     }
 
     /// Number of rows that were dropped because the writer thread was too slow, for example to compress images.
@@ -173,6 +186,20 @@ impl FoxgloveServer {
 struct FoxgloveObserver {
     recorder: Recorder,
     server: Arc<LiveServer>,
+    /// True once a failure of the recorder was reported.
+    has_failed: bool,
+}
+
+impl FoxgloveObserver {
+    /// Reports an error that stopped the recorder, and disconnects the clients: they would see a state that never
+    /// changes.
+    fn stop_after_failure(&mut self) {
+        if let Some(reason) = self.recorder.failure().filter(|_| !self.has_failed) {
+            tracing::error!(target: "kinetoscope_record", %reason, "the stream to Foxglove stopped");
+            self.server.stop();
+            self.has_failed = true;
+        }
+    }
 }
 
 impl fmt::Debug for FoxgloveObserver {
@@ -183,16 +210,18 @@ impl fmt::Debug for FoxgloveObserver {
 
 impl Observer for FoxgloveObserver {
     fn due_in(&self, sim: &SimulationManager) -> u64 {
-        self.recorder.due_in(sim)
+        if self.recorder.has_failed() && !self.has_failed { 1 } else { self.recorder.due_in(sim) }
     }
 
     fn on_event(&mut self, sim: &mut SimulationManager, event: &SimEvent) {
         self.recorder.set_paused(self.server.clients() == 0);
         self.recorder.on_event(sim, event);
+        self.stop_after_failure();
     }
 
     fn on_published(&mut self, sim: &mut SimulationManager, event: &dyn Any) {
         self.recorder.set_paused(self.server.clients() == 0);
         self.recorder.on_published(sim, event);
+        self.stop_after_failure();
     }
 }

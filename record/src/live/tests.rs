@@ -265,6 +265,27 @@ fn no_reader() {
     assert!(TcpStream::connect(server.address()).is_err(), "the server does not listen");
 }
 
+/// Regression: a stream that an error had stopped kept its clients, which saw a robot that never moved again, and no
+/// caller learned of the error.
+#[test]
+fn failed_stream() {
+    let mut world = World::new(1, 1);
+    let server = world.sim.stream_to_foxglove(any_port()).unwrap();
+    let mut client = connect(&server, topic_count(&mut world.sim));
+    client.subscribe();
+    world.step(0);
+    assert_eq!(server.failure(&world.sim).unwrap(), None);
+    // A second robot adds joints, which the sensor of all joints now measures.
+    world.sim.add_robot(kinetoscope_testkit::worlds::sr5("other")).unwrap();
+    (1..20).for_each(|step| world.step(step));
+    let reason = server.failure(&world.sim).unwrap().unwrap();
+    assert!(reason.contains("joints"), "{reason}");
+    wait::until("the server disconnects", || client.socket.read().is_err());
+    assert_eq!(server.clients(), 0);
+    let error = server.close(&mut world.sim).unwrap_err().to_string();
+    assert!(error.contains("joints"), "{error}");
+}
+
 #[test]
 fn errors() {
     let mut sim = sim(cfg(1, 1));
