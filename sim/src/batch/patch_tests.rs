@@ -14,11 +14,11 @@ const SCENE: &str = r#"<mujoco><option timestep="0.003"/><worldbody><geom type="
     <body name="a" pos="1 0 0.105"><freejoint/><geom type="box" size="0.1 0.1 0.1"/></body>
     <body name="b" pos="1 0 0.32"><freejoint/><geom type="ellipsoid" size="0.1 0.08 0.1"/></body>
     <body name="base" pos="2 0 0"><geom type="box" size="0.3 0.3 0.02"/></body>
-    <body name="can" pos="2 0 0.2"><freejoint/><geom type="cylinder" size="0.1 0.1"/></body>
+    <body pos="2 0 0.2"><freejoint/><geom type="cylinder" size="0.1 0.1"/></body>
     <body name="c" pos="3 0 1"><freejoint/><geom size="0.1"/></body>
     <body name="d" pos="3.3 0 1"><freejoint/><geom size="0.1"/></body></worldbody>
     <tendon><fixed name="t" frictionloss="0.01"><joint joint="hinge" coef="1"/></fixed></tendon>
-    <equality><weld body1="a" body2="b" active="false"/><connect body1="base" body2="can" anchor="0.1 0 0"/>
+    <equality><weld body1="a" body2="b" active="false"/><connect body1="base" body2="c" anchor="0.1 0 0"/>
       <weld body1="c" body2="d" relpose="0.3 0 0 0.52 -1 -0.11 0.44"/></equality>
     <actuator><motor joint="hinge" gear="2"/></actuator>
     <sensor><framepos objtype="site" objname="tip"/><accelerometer site="tip"/></sensor></mujoco>"#;
