@@ -23,6 +23,21 @@ class Images:
     ids: np.ndarray
 
 
+def segmentation(renderer):
+    """Segmentation of the scene.
+
+    MuJoCo 2 sometimes reads no pixels in long runs of many renderers, and takes the content of new memory for ids: then
+    it fails with an IndexError, and the next call succeeds.
+    """
+    attempts = 3 if mujoco.__version__.startswith("2.") else 1
+    for attempt in range(attempts):
+        try:
+            return renderer.render().copy()
+        except IndexError:
+            if attempt + 1 == attempts:
+                raise
+
+
 def images(renderer, data, camera) -> Images:
     """All images of a state."""
     renderer.update_scene(data, camera)
@@ -31,7 +46,7 @@ def images(renderer, data, camera) -> Images:
     depth = renderer.render().copy()
     renderer.disable_depth_rendering()
     renderer.enable_segmentation_rendering()
-    ids = renderer.render().copy()
+    ids = segmentation(renderer)
     renderer.disable_segmentation_rendering()
     flags = renderer.scene.flags
     effects = [int(flag) for flag in (mujoco.mjtRndFlag.mjRND_SHADOW, mujoco.mjtRndFlag.mjRND_REFLECTION)]

@@ -4,6 +4,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import kinetoscope_render
@@ -31,6 +32,7 @@ def test_the_stub_fits_the_module(strict):
     assert result.returncode == 0, result.stdout + result.stderr
 
 
+@pytest.mark.skipif(np.__version__.startswith("1."), reason="in the types of NumPy 1, arrays need type arguments")
 def test_strict_types(strict):
     result = run("mypy", "--config-file", strict, "-p", PACKAGE.name)
     assert result.returncode == 0, result.stdout + result.stderr
