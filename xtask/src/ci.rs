@@ -297,6 +297,8 @@ fn unit_tests(context: &Context<'_>) -> XtaskResult {
         .debian()?
         .cargo()
         .args(["test", "--workspace", "--lib", "--bins"])
+        // An extension module links no Python, so its tests cannot be linked.
+        .args(["--exclude", "kinetoscope-python", "--exclude", "kinetoscope-python-render"])
         .args(test::features(&["--workspace"]))
         .run()
 }
