@@ -280,8 +280,8 @@ fn failed_stream() {
     (1..20).for_each(|step| world.step(step));
     let reason = server.failure(&world.sim).unwrap().unwrap();
     assert!(reason.contains("joints"), "{reason}");
+    assert_eq!(server.clients(), 0, "the server ends the connections");
     wait::until("the server disconnects", || client.socket.read().is_err());
-    assert_eq!(server.clients(), 0);
     let error = server.close(&mut world.sim).unwrap_err().to_string();
     assert!(error.contains("joints"), "{error}");
 }
