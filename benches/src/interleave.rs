@@ -250,7 +250,7 @@ mod tests {
     }
 
     #[test]
-    fn a_side_that_takes_twice_as_long_has_half_the_ratio() {
+    fn ratio_of_times() {
         let (mut ours, mut baseline) = (Sleeper(20), Sleeper(10));
         let plan = MeasurementCfg { seconds: 0.0, restart_after: 100 };
         let times = measure(plan, &mut [&mut ours, &mut baseline]).expect("sleeps");

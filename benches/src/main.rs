@@ -116,7 +116,7 @@ mod tests {
     use clap::CommandFactory;
 
     #[test]
-    fn the_command_line_is_consistent_and_names_every_benchmark() {
+    fn command_line() {
         Args::command().debug_assert();
         let help = Args::command().render_help().to_string();
         for (name, _) in BENCHES {
@@ -125,7 +125,7 @@ mod tests {
     }
 
     #[test]
-    fn an_unknown_name_is_an_error_that_lists_the_known_ones() {
+    fn unknown_name() {
         let error = run(&Args::parse_from(["x", "setp"])).map_err(|e| e.to_string()).err().unwrap_or_default();
         assert!(error.contains("setp") && error.contains("startup"), "{error}");
     }

@@ -34,12 +34,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn idle_and_guest_times_do_not_count() {
+    fn idle_and_guest_times() {
         assert_eq!(busy_ticks("cpu  1 2 4 1000 2000 8 16 32 4000 8000\ncpu0 1"), Some(63));
     }
 
     #[test]
-    fn a_name_with_blanks_and_parentheses_is_skipped() {
+    fn names_with_blanks() {
         assert_eq!(process_ticks("7 (a) b) S 1 2 3 4 5 6 7 8 9 10 30 12 0 0"), Some(42));
     }
 

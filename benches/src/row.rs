@@ -110,7 +110,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn json_has_the_agreed_keys_and_a_miss_is_marked() {
+    fn json_of_a_row() {
         let row = Row::new("step", "arm, 64 envs", "env-steps/s", 2, 90.0).against("bare loop", 100.0, 0.9);
         let json = serde_json::to_value(&row).unwrap_or_default();
         let keys: Vec<&String> = json.as_object().map(|o| o.keys().collect()).unwrap_or_default();

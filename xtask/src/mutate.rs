@@ -270,7 +270,7 @@ mod tests {
     }
 
     #[test]
-    fn each_binary_is_tried_once_with_all_its_words() {
+    fn binaries_of_a_mutation() {
         let all = binaries(&mutations::all().collect::<Vec<_>>());
         for mutation in mutations::all() {
             let (binary, words) = mutation.tests;

@@ -285,7 +285,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn pictures_agree_up_to_a_pixel_and_to_how_background_is_written() {
+    fn comparison_of_pictures() {
         let ours = [1.0, 1.0, 2.0, 2.0, 3.0, f32::INFINITY];
         assert_eq!(agreement(&ours, &[1.01, 1.0, 1.0, 3.0, 0.0, 99.0], [6, 1]), 1.0);
         assert_eq!(agreement(&ours, &[2.0, 1.0, 2.0, 1.0, 1.0, 99.0], [6, 1]), 0.5);
