@@ -178,16 +178,3 @@ fn numbered(path: &Path, number: usize) -> PathBuf {
     }
     path.with_file_name(name)
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn later_files_have_numbers() {
-        let of = |path: &str, k| numbered(Path::new(path), k).display().to_string();
-        assert_eq!([1, 2, 13].map(|k| of("a/run.mcap", k)), ["a/run.mcap", "a/run-2.mcap", "a/run-13.mcap"]);
-        assert_eq!(of("pictures", 2), "pictures-2");
-        assert_eq!(of("..", 2), "..", "a path without a file name stays unchanged");
-    }
-}

@@ -213,3 +213,23 @@ fn broken_recording() {
     assert_eq!(whole.len(), 1, "{whole:?}");
     assert!(whole[0].path.is_file());
 }
+
+/// Every press of the button writes a file of its own, with a number from the second on.
+#[test]
+fn numbered_files() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut world = RecordedWorld::new(1, 1);
+    for (name, expected) in
+        [("run.mcap", ["run.mcap", "run-2.mcap", "run-3.mcap"]), ("a.b.npz", ["a.b.npz", "a.b-2.npz", "a.b-3.npz"])]
+    {
+        let mut files = FileRecording::new(RecorderCfg::new(folder.path().join(name)));
+        for step in 0..3 {
+            files.set(&mut world.sim, true).unwrap();
+            world.step(step);
+            files.set(&mut world.sim, false).unwrap();
+        }
+        let recorded = files.finish(&mut world.sim).unwrap();
+        let names: Vec<_> = recorded.iter().map(|recorded| recorded.path.file_name().unwrap()).collect();
+        assert_eq!(names, expected);
+    }
+}

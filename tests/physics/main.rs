@@ -12,6 +12,7 @@ mod bounce;
 mod lab;
 mod law;
 mod rows;
+mod tolerance;
 mod urdf;
 
 mod articulated;

@@ -5,7 +5,7 @@ use crate::python;
 use crate::python_package::{self, BuildProfile, built_wheel, create, maturin, remove_wheels, wheels};
 use crate::run::{Cmd, Failure, Repo, XtaskResult};
 use crate::setup::{self, MujocoVersion, Prepared, Requirement, Requirements};
-use crate::wheel;
+use crate::{test, wheel};
 use std::path::{Path, PathBuf};
 use std::{env, fs};
 
@@ -67,7 +67,8 @@ pub(crate) fn test(repo: &Repo) -> XtaskResult {
     setup::try_to_have(Requirement::Xvfb);
     let wheels = [python_package::build(repo, BuildProfile::Test)?, build(repo, BuildProfile::Test)?];
     // The judge of the test that compares with Rust.
-    ready.cargo().args(["build", "--package", "kinetoscope-cli"]).run()?;
+    let all = ["--workspace"];
+    ready.cargo().arg("build").args(all).args(test::features(&all)).args(["--bin", "kinetoscope"]).run()?;
     let python = environment(repo)?;
     install(&python, &wheels)?;
     // The requirements of the wheels are those that are installed.

@@ -1,6 +1,7 @@
 //! Rules for the text of the tree: places of `unsafe`, length of files, forbidden leftovers.
 
 use crate::run::{Repo, XtaskResult, no_findings};
+use serde_json::Value;
 use std::path::Path;
 
 /// The only places with unsafe code: generated bindings, the crate that calls them, and the thread pool.
@@ -52,6 +53,7 @@ pub(crate) fn run(repo: &Repo) -> XtaskResult {
     findings.extend(foreign_paths(&files));
     findings.extend(large_api(&files));
     findings.extend(dependencies_without_reason(&repo.read("Cargo.toml")?));
+    findings.extend(tests_that_never_run(&files, &folders_without_tests(&repo.metadata, &repo.root)));
     no_findings("rules of the tree are broken", &findings)
 }
 
@@ -263,6 +265,32 @@ fn dependencies_without_reason(cargo_toml: &str) -> Vec<String> {
         .collect()
 }
 
+/// Source folders of packages whose library and programs are not built as tests (`test = false`).
+fn folders_without_tests(metadata: &Value, root: &Path) -> Vec<String> {
+    let mut folders = Vec::new();
+    for package in metadata["packages"].as_array().into_iter().flatten() {
+        let manifest = Path::new(package["manifest_path"].as_str().unwrap_or_default());
+        let Some(folder) = manifest.parent().map(|folder| folder.join("src")) else { continue };
+        let is_tested = |target: &Value| {
+            target["test"] == true
+                && target["src_path"].as_str().is_some_and(|path| Path::new(path).starts_with(&folder))
+        };
+        if !package["targets"].as_array().into_iter().flatten().any(is_tested)
+            && let Ok(folder) = folder.strip_prefix(root)
+        {
+            folders.push(format!("{}/", folder.display()));
+        }
+    }
+    folders
+}
+
+fn tests_that_never_run(files: &[TextFile], folders: &[String]) -> Vec<String> {
+    let is_there = |file: &&TextFile| file.is_rust() && folders.iter().any(|folder| file.path.starts_with(folder));
+    let has_test = |file: &&TextFile| code_only(&file.text).contains("#[test]");
+    let files = files.iter().filter(is_there).filter(has_test);
+    files.map(|file| format!("{}: this test never runs: its package has `test = false`", file.path)).collect()
+}
+
 fn line_of(text: &str, at: usize) -> usize {
     text[..at].matches('\n').count() + 1
 }
@@ -468,6 +496,29 @@ mod tests {
         assert!(findings[0].contains("`serde`") && findings[1].contains("`regex`"), "{findings:?}");
         let names: Vec<String> = workspace_dependencies(toml).into_iter().map(|(name, _)| name).collect();
         assert_eq!(names, ["clap", "serde", "regex"]);
+    }
+
+    #[test]
+    fn packages_without_tests() {
+        let target = |test: bool, path: &str| serde_json::json!({"test": test, "src_path": path});
+        let package = |folder: &str, targets: &[Value]| serde_json::json!({"manifest_path": format!("/tree/{folder}Cargo.toml"), "targets": targets});
+        let metadata = serde_json::json!({"packages": [
+            package("", &[target(false, "/tree/src/lib.rs"), target(true, "/tree/tests/api/main.rs")]),
+            package("cli/", &[target(false, "/tree/cli/src/main.rs")]),
+            package("sim/", &[target(true, "/tree/sim/src/lib.rs")]),
+        ]});
+        let folders = folders_without_tests(&metadata, Path::new("/tree"));
+        assert_eq!(folders, ["src/", "cli/src/"]);
+        let test = "#[test]\nfn f() {}";
+        for (path, text, found) in [
+            ("src/a.rs", test, 1),
+            ("cli/src/a.rs", test, 1),
+            ("sim/src/a.rs", test, 0),
+            ("tests/api/a.rs", test, 0),
+            ("src/a.rs", "// #[test]", 0),
+        ] {
+            assert_eq!(tests_that_never_run(&file(path, text), &folders).len(), found, "{path}");
+        }
     }
 
     #[test]

@@ -2,7 +2,7 @@
 //! software.
 
 use crate::robots::{self, Robots};
-use crate::run::{Failure, Repo, XtaskResult};
+use crate::run::{Cmd, Failure, Repo, XtaskResult};
 use crate::setup::{self, MujocoVersion, Requirement, Requirements};
 use crate::{physics_report, python};
 
@@ -36,6 +36,9 @@ const NEEDS_VENDOR_ROBOTS: SkippedTests = SkippedTests {
     name: "vendor",
     why: "these tests need robots that PyPI does not have; KINETOSCOPE_ROBOTS names others",
 };
+
+const NEEDS_LEROBOT: SkippedTests =
+    SkippedTests { name: "lerobot::own_loader", why: "LeRobot's own loader brings some gigabytes" };
 
 /// Arguments for commands that do not build the whole workspace: packages whose dependencies have the features that the
 /// whole workspace has. Without them, cargo compiles dependencies again, a third of all crates.
@@ -111,6 +114,9 @@ pub(crate) fn run_packages(repo: &Repo, args: &TestArgs, packages: &[&str]) -> X
         cargo = cargo.env(python::VARIABLE, python.ok_or_else(|| Failure::new("no Python with MuJoCo's renderer"))?);
     }
     let readers = python::with_readers(repo).ok_or_else(|| Failure::new("no Python with readers of recordings"))?;
+    if !Cmd::new(&readers).args(["-c", "import lerobot"]).quiet().succeeds() {
+        left_out.push(NEEDS_LEROBOT);
+    }
     cargo = cargo.env(python::READERS_VARIABLE, readers);
     for SkippedTests { name, why } in &left_out {
         eprintln!("left out: tests named `{name}`: {why}");
