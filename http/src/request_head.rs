@@ -1,6 +1,6 @@
 //! Parser of HTTP request heads, with limits on size and duration.
 
-use super::response::Status;
+use crate::response::Status;
 use std::io::{ErrorKind, Read};
 use std::net::TcpStream;
 use std::time::{Duration, Instant};
@@ -14,20 +14,24 @@ const READ_TIMEOUT: Duration = Duration::from_secs(5);
 
 /// A parsed HTTP request head.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) struct RequestHead {
-    pub(super) method: String,
+pub struct RequestHead {
+    /// Method, such as `GET`.
+    pub method: String,
     /// Path without the query.
-    pub(super) path: String,
+    pub path: String,
     /// Query without the question mark.
-    pub(super) query: String,
+    pub query: String,
     headers: Vec<(String, String)>,
     /// Bytes received after the head.
-    pub(super) rest: Vec<u8>,
+    pub rest: Vec<u8>,
 }
 
 impl RequestHead {
-    /// Reads a request head. Returns `None` if the client sent nothing, or if the connection failed.
-    pub(super) fn read(stream: &mut TcpStream) -> Result<Option<Self>, Status> {
+    /// Reads a request head, at most 16 KiB within 5 s. Returns `None` if the client sent nothing, or if the connection failed.
+    ///
+    /// # Errors
+    /// The status of a response for a request that is malformed, too large or too slow.
+    pub fn read(stream: &mut TcpStream) -> Result<Option<Self>, Status> {
         let start = Instant::now();
         let mut bytes = Vec::new();
         let mut chunk = [0; 2048];
@@ -82,8 +86,11 @@ impl RequestHead {
         }))
     }
 
-    /// Returns the value of a header, by lower-case name. Duplicate headers are ambiguous and give an error.
-    pub(super) fn header(&self, name: &str) -> Result<Option<&str>, Status> {
+    /// Returns the value of a header, by lower-case name.
+    ///
+    /// # Errors
+    /// The header occurs several times, which is ambiguous.
+    pub fn header(&self, name: &str) -> Result<Option<&str>, Status> {
         let mut values = self.headers.iter().filter(|(n, _)| n == name).map(|(_, value)| value.as_str());
         match (values.next(), values.next()) {
             (value, None) => Ok(value),
@@ -92,13 +99,13 @@ impl RequestHead {
     }
 
     /// True if a comma-separated header contains a word.
-    pub(super) fn header_contains(&self, name: &str, word: &str) -> bool {
+    pub fn header_contains(&self, name: &str, word: &str) -> bool {
         let values = self.headers.iter().filter(|(n, _)| n == name);
         values.flat_map(|(_, value)| value.split(',')).any(|item| item.trim().eq_ignore_ascii_case(word))
     }
 
     /// Returns a value of the query.
-    pub(super) fn query(&self, key: &str) -> Option<&str> {
+    pub fn query(&self, key: &str) -> Option<&str> {
         self.query.split('&').filter_map(|pair| pair.split_once('=')).find(|(k, _)| *k == key).map(|(_, value)| value)
     }
 }

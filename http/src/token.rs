@@ -1,15 +1,15 @@
-//! Access token of views that other machines can reach.
+//! Access token of servers that other machines can reach.
 
-use super::error::ServeError;
+use crate::error::ServeError;
 use std::fmt;
 use subtle::ConstantTimeEq;
 
 /// Number of random bytes of a token: 128 bits cannot be guessed.
 const TOKEN_BYTES: usize = 16;
 
-/// A random secret that grants access to a view.
+/// A random secret that grants access to a server.
 #[derive(Clone, PartialEq, Eq)]
-pub(super) struct Token(String);
+pub struct Token(String);
 
 impl fmt::Debug for Token {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -19,25 +19,31 @@ impl fmt::Debug for Token {
 
 impl Token {
     /// Creates a random token.
-    pub(super) fn random() -> Result<Self, ServeError> {
+    ///
+    /// # Errors
+    /// The operating system provides no random numbers.
+    pub fn random() -> Result<Self, ServeError> {
         Ok(Self(random_hex()?))
     }
 
     /// Returns the token as used in the URL.
-    pub(super) fn as_str(&self) -> &str {
+    pub fn as_str(&self) -> &str {
         &self.0
     }
 
     /// True if `given` equals the token. The comparison takes constant time, so its duration reveals nothing about the
     /// token.
-    pub(super) fn matches(&self, given: &str) -> bool {
+    pub fn matches(&self, given: &str) -> bool {
         // The length is not secret.
         self.0.as_bytes().ct_eq(given.as_bytes()).into()
     }
 }
 
 /// Returns 32 random hexadecimal digits.
-pub(super) fn random_hex() -> Result<String, ServeError> {
+///
+/// # Errors
+/// The operating system provides no random numbers.
+pub fn random_hex() -> Result<String, ServeError> {
     let mut bytes = [0; TOKEN_BYTES];
     getrandom::fill(&mut bytes).map_err(|error| ServeError::System(format!("no random numbers: {error}")))?;
     Ok(bytes.iter().map(|byte| format!("{byte:02x}")).collect())

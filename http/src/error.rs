@@ -1,8 +1,8 @@
-//! Errors of starting a browser view.
+//! Errors of starting a server.
 
 use std::net::SocketAddr;
 
-/// An error of starting a browser view.
+/// An error of starting a server.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ServeError {

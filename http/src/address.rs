@@ -1,6 +1,6 @@
-//! Address parsing and listening of the browser view.
+//! Address parsing and listening.
 
-use super::error::ServeError;
+use crate::error::ServeError;
 use std::io::ErrorKind;
 use std::net::{IpAddr, Ipv4Addr, SocketAddr, TcpListener, UdpSocket};
 
@@ -11,7 +11,10 @@ const PORT_CANDIDATES: u16 = 64;
 
 /// Parses an address such as `127.0.0.1:8080`, `[::1]:8080`, `localhost:8080`, `127.0.0.1` or `8080`. Host names other
 /// than `localhost` are not resolved.
-pub(super) fn parse(given: &str) -> Result<SocketAddr, ServeError> {
+///
+/// # Errors
+/// The text is no such address; the error suggests others.
+pub fn parse_address(given: &str) -> Result<SocketAddr, ServeError> {
     let text = given.trim();
     let local = |port| SocketAddr::from((Ipv4Addr::LOCALHOST, port));
     if let Ok(address) = text.parse::<SocketAddr>() {
@@ -37,8 +40,11 @@ pub(super) fn parse(given: &str) -> Result<SocketAddr, ServeError> {
     Err(ServeError::Address { given: given.into(), reason, candidates })
 }
 
-/// Listens at an address. If the port is in use, the error suggests the next free port.
-pub(super) fn listen(address: SocketAddr) -> Result<TcpListener, ServeError> {
+/// Listens at an address.
+///
+/// # Errors
+/// The operating system refuses. If the port is in use, the error suggests the next free port.
+pub fn listen(address: SocketAddr) -> Result<TcpListener, ServeError> {
     let error = match TcpListener::bind(address) {
         Ok(listener) => return Ok(listener),
         Err(error) => error,
@@ -76,7 +82,7 @@ fn next_free(address: SocketAddr) -> Option<SocketAddr> {
 
 /// Returns the address under which other machines reach the server. For an unspecified address, this is the IPv4
 /// address of the default network interface, or 127.0.0.1 without one.
-pub(super) fn reachable_address(address: SocketAddr) -> SocketAddr {
+pub fn reachable_address(address: SocketAddr) -> SocketAddr {
     if !address.ip().is_unspecified() {
         return address;
     }
@@ -111,7 +117,7 @@ mod tests {
             (" 10.0.0.7 ", "10.0.0.7:8080"),
             ("", "127.0.0.1:8080"),
         ] {
-            assert_eq!(parse(given).expect(given).to_string(), expected, "{given:?}");
+            assert_eq!(parse_address(given).expect(given).to_string(), expected, "{given:?}");
         }
         for (given, says, candidate) in [
             ("127.0.0.1:99999", "invalid port", "127.0.0.1:8080"),
@@ -120,7 +126,7 @@ mod tests {
             ("1.2.3:70", "neither an IP address", "127.0.0.1:70"),
             ("-1", "neither an IP address", "127.0.0.1:8080"),
         ] {
-            let Err(ServeError::Address { reason, candidates, .. }) = parse(given) else { panic!("{given:?}") };
+            let Err(ServeError::Address { reason, candidates, .. }) = parse_address(given) else { panic!("{given:?}") };
             assert!(reason.contains(says), "{given:?}: {reason}");
             assert_eq!(candidates[0], candidate, "{given:?}");
         }

@@ -1,13 +1,13 @@
 //! Access control: refuses requests from other websites and requests without the token.
 
-use super::request_head::RequestHead;
-use super::response::Status;
-use super::token::Token;
+use crate::request_head::RequestHead;
+use crate::response::Status;
+use crate::token::Token;
 use std::net::{IpAddr, SocketAddr};
 
-/// Access policy of one view.
+/// Access policy of one server.
 #[derive(Clone, Debug)]
-pub(super) struct AccessPolicy {
+pub struct AccessPolicy {
     /// True if the server listens on loopback only.
     local: bool,
     token: Option<Token>,
@@ -15,7 +15,7 @@ pub(super) struct AccessPolicy {
 
 impl AccessPolicy {
     /// Creates the policy of an address, with a token if other machines can reach it.
-    pub(super) fn new(address: SocketAddr, token: Option<Token>) -> Self {
+    pub fn new(address: SocketAddr, token: Option<Token>) -> Self {
         Self { local: address.ip().is_loopback(), token }
     }
 
@@ -23,8 +23,11 @@ impl AccessPolicy {
     ///
     /// Even on a loopback address, any website can make a local browser send requests to this server. The `Origin`
     /// header reveals such requests. With DNS rebinding the origin matches, but the `Host` header names the website, so
-    /// a loopback view accepts only host names of this machine. The port may differ, because of tunnels.
-    pub(super) fn check(&self, head: &RequestHead) -> Result<(), Status> {
+    /// a loopback server accepts only host names of this machine. The port may differ, because of tunnels.
+    ///
+    /// # Errors
+    /// The status of the refusal.
+    pub fn check(&self, head: &RequestHead) -> Result<(), Status> {
         let host = head.header("host")?.ok_or(Status::BadRequest)?;
         if self.local && !is_local(host) {
             return Err(Status::Forbidden);
