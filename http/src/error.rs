@@ -37,6 +37,14 @@ pub enum ServeError {
         #[source]
         error: std::io::Error,
     },
+    /// A text is not the origin of a website.
+    #[error(
+        "{given:?} is no origin of a website: write scheme, host and port without a path, such as https://example.org or http://localhost:8080"
+    )]
+    Origin {
+        /// The text.
+        given: String,
+    },
     /// The operating system provides no random numbers or no thread.
     #[error("cannot serve: {0}")]
     System(String),

@@ -2,7 +2,7 @@
 //! token.
 //!
 //! ```text
-//! parse_address -> listen -> RequestHead::read -> AccessPolicy::check -> the server, or send_error
+//! parse_address -> listen -> RequestHead -> AccessPolicy::check -> the server, or an error response
 //! ```
 //!
 //! The browser view and the live stream to Foxglove use it. What follows an accepted request is theirs.
@@ -19,5 +19,5 @@ pub use access_policy::AccessPolicy;
 pub use address::{listen, parse_address, reachable_address};
 pub use error::ServeError;
 pub use request_head::RequestHead;
-pub use response::{Status, drain, send, send_error};
-pub use token::{Token, random_hex};
+pub use response::{Status, drain, error_response, send, send_error};
+pub use token::{Token, random_hex, random_loopback};

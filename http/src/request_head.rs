@@ -9,9 +9,6 @@ use std::time::{Duration, Instant};
 const MAX_BYTES: usize = 16 << 10;
 /// Maximum number of headers.
 const MAX_HEADERS: usize = 96;
-/// Timeout of a complete request head. Clients that send a byte per second are refused.
-const READ_TIMEOUT: Duration = Duration::from_secs(5);
-
 /// A parsed HTTP request head.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct RequestHead {
@@ -27,6 +24,9 @@ pub struct RequestHead {
 }
 
 impl RequestHead {
+    /// Timeout of a complete request head. Clients that send a byte per second are refused.
+    pub const READ_TIMEOUT: Duration = Duration::from_secs(5);
+
     /// Reads a request head, at most 16 KiB within 5 s. Returns `None` if the client sent nothing, or if the connection failed.
     ///
     /// # Errors
@@ -36,7 +36,7 @@ impl RequestHead {
         let mut bytes = Vec::new();
         let mut chunk = [0; 2048];
         loop {
-            let left = READ_TIMEOUT.saturating_sub(start.elapsed());
+            let left = Self::READ_TIMEOUT.saturating_sub(start.elapsed());
             if left.is_zero() || stream.set_read_timeout(Some(left)).is_err() {
                 return Err(Status::Timeout);
             }
@@ -53,14 +53,14 @@ impl RequestHead {
             if let Some(head) = Self::parse(&bytes)? {
                 return Ok(Some(head));
             }
-            if bytes.len() >= MAX_BYTES {
-                return Err(Status::HeadTooLarge);
-            }
         }
     }
 
-    /// Parses a complete head, or returns `None` if more bytes are needed.
-    fn parse(bytes: &[u8]) -> Result<Option<Self>, Status> {
+    /// Parses the first bytes of a connection, or returns `None` if the head is not complete.
+    ///
+    /// # Errors
+    /// The status of a response for a request that is malformed or too large.
+    pub fn parse(bytes: &[u8]) -> Result<Option<Self>, Status> {
         let mut headers = [httparse::EMPTY_HEADER; MAX_HEADERS];
         let mut request = httparse::Request::new(&mut headers);
         let length = match request.parse(bytes) {
@@ -68,6 +68,7 @@ impl RequestHead {
             Ok(httparse::Status::Complete(_)) | Err(httparse::Error::TooManyHeaders) => {
                 return Err(Status::HeadTooLarge);
             }
+            Ok(httparse::Status::Partial) if bytes.len() >= MAX_BYTES => return Err(Status::HeadTooLarge),
             Ok(httparse::Status::Partial) => return Ok(None),
             Err(_) => return Err(Status::BadRequest),
         };
@@ -133,6 +134,9 @@ mod tests {
         for end in 1..text.len() - "more".len() {
             assert_eq!(parsed(&text[..end]), Ok(None), "{:?}", &text[..end]);
         }
+        let long = format!("GET / HTTP/1.1\r\nCookie: {}", "a".repeat(MAX_BYTES));
+        assert_eq!(parsed(&long[..MAX_BYTES - 1]), Ok(None));
+        assert_eq!(parsed(&long[..MAX_BYTES]), Err(Status::HeadTooLarge));
         let many: String = (0..=MAX_HEADERS).map(|k| format!("a{k}: b\r\n")).collect();
         assert_eq!(parsed(&format!("GET / HTTP/1.1\r\n{many}\r\n")), Err(Status::HeadTooLarge));
     }

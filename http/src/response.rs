@@ -66,8 +66,13 @@ impl Status {
     }
 }
 
-/// Sends a status and an explanation. Responses to HEAD requests have no body.
+/// Sends a status and an explanation, and closes the connection. Responses to HEAD requests have no body.
 pub fn send_error(stream: &mut TcpStream, status: Status, with_body: bool) {
+    write_and_close(stream, &error_response(status, with_body));
+}
+
+/// The response with a status and an explanation. Responses to HEAD requests have no body.
+pub fn error_response(status: Status, with_body: bool) -> String {
     let more: &[(&str, &str)] = match status {
         Status::MethodNotAllowed => &[("Allow", "GET, HEAD")],
         Status::UpgradeRequired => &[("Upgrade", "websocket"), ("Sec-WebSocket-Version", "13")],
@@ -75,12 +80,16 @@ pub fn send_error(stream: &mut TcpStream, status: Status, with_body: bool) {
         _ => &[],
     };
     let more: Vec<_> = more.iter().copied().chain([("Content-Type", "text/plain; charset=utf-8")]).collect();
-    send(stream, status.status_line(), &more, &format!("{}\n", status.explanation()), with_body);
+    response(status.status_line(), &more, &format!("{}\n", status.explanation()), with_body)
 }
 
 /// Sends a response with further headers, such as `("Content-Type", "text/html")`, and closes the connection. `line` is the
 /// status, such as `200 OK`.
 pub fn send(stream: &mut TcpStream, line: &str, more: &[(&str, &str)], body: &str, with_body: bool) {
+    write_and_close(stream, &response(line, more, body, with_body));
+}
+
+fn response(line: &str, more: &[(&str, &str)], body: &str, with_body: bool) -> String {
     let more: String = more.iter().map(|(name, value)| format!("{name}: {value}\r\n")).collect();
     let head = format!(
         "HTTP/1.1 {line}\r\n{more}Content-Length: {}\r\nCache-Control: no-store\r\nReferrer-Policy: no-referrer\r\n\
@@ -88,7 +97,11 @@ pub fn send(stream: &mut TcpStream, line: &str, more: &[(&str, &str)], body: &st
         body.len()
     );
     let body = if with_body { body } else { "" };
-    let sent = stream.set_write_timeout(Some(WRITE_TIMEOUT)).and_then(|()| stream.write_all((head + body).as_bytes()));
+    head + body
+}
+
+fn write_and_close(stream: &mut TcpStream, response: &str) {
+    let sent = stream.set_write_timeout(Some(WRITE_TIMEOUT)).and_then(|()| stream.write_all(response.as_bytes()));
     if sent.is_ok() {
         drain(stream);
     }

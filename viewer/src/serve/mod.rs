@@ -40,6 +40,9 @@ use std::net::SocketAddr;
 use std::sync::{Arc, Weak};
 use viewer_session::ViewerHub;
 
+/// Port of an address without a port.
+const DEFAULT_PORT: u16 = 8080;
+
 /// Settings of the browser view.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -126,7 +129,7 @@ pub trait Serve {
 impl Serve for SimulationManager {
     fn serve_with(&mut self, address: &str, mut cfg: ServeCfg) -> Result<ServerHandle, ServeError> {
         let (button, max_viewers) = (cfg.record_button.take(), cfg.max_viewers);
-        let asked = parse_address(address)?;
+        let asked = parse_address(address, DEFAULT_PORT)?;
         let listener = listen(asked)?;
         let address = listener.local_addr().map_err(|error| ServeError::Listen { address: asked, error })?;
         let token = if address.ip().is_loopback() { None } else { Some(Token::random()?) };
