@@ -24,7 +24,7 @@ use kinetoscope::scene::{KeyedRng, Marker};
 use kinetoscope::tasks::{
     CommandTerm, Env, EnvBuilder, EnvCfg, ObservationTerm, RewardTerm, TermContext, TermResult, VectorEnv, terms,
 };
-use launcher::{Launcher, MainLoop, curve, image_file, stage, trial};
+use launcher::{Launcher, MainLoop, stage, trial};
 use serde_json::json;
 use std::path::Path;
 use std::process::ExitCode;
@@ -352,7 +352,25 @@ fn write_curve(rows: &[[f64; 3]], out: &Path) -> launcher::Result {
     }
     let file = out.join("curve.csv");
     std::fs::write(&file, text).map_err(|e| format!("{}: {e}", file.display()))?;
-    let reached: Vec<f64> = rows.iter().map(|row| row[2]).collect();
-    let drawn = curve::plot("share of targets reached while trying changes, by iteration", &reached);
-    image_file::write_png(&out.join("curve.png"), &drawn)
+    plot_curve(rows, &out.join("curve.png"))
+}
+
+#[cfg(feature = "viewer")]
+fn plot_curve(rows: &[[f64; 3]], file: &Path) -> launcher::Result {
+    use kinetoscope::viewer::plot::{self, Plot, Series};
+    let reached = (1..).zip(rows).map(|(k, row)| [f64::from(k), row[2]]);
+    let plot = Plot {
+        title: "share of targets reached while trying changes".into(),
+        axis_labels: ["iteration".into(), "share".into()],
+        series: vec![Series::new("reached", reached)],
+        ..Plot::default()
+    };
+    Ok(plot::write(&plot, file)?)
+}
+
+/// Writes nothing: plots are a part of the viewers.
+#[cfg(not(feature = "viewer"))]
+fn plot_curve(_: &[[f64; 3]], file: &Path) -> launcher::Result {
+    println!("{} is left out: this build has no plots; build with the feature `viewer`", file.display());
+    Ok(())
 }

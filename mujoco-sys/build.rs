@@ -1,7 +1,7 @@
 //! Finds MuJoCo, checks that its version is supported (2.2.2 or 4.x), and generates the bindings.
 //!
 //! Search order: `MUJOCO_DIR` (a folder with `include/mujoco/mujoco.h` and `libmujoco.so*`, as in the PyPI wheel), then
-//! with the feature `download` the PyPI wheel itself, otherwise the system's include folders (Debian's `libmujoco-dev`).
+//! with the feature `download` the PyPI wheel itself (kept in `~/.local/share/kinetoscope`), otherwise the system's include folders (Debian's `libmujoco-dev`).
 //!
 //! On docs.rs, where MuJoCo is missing, the committed declarations of 2.2.2 are used and nothing is linked.
 
@@ -142,11 +142,12 @@ impl Installation {
     }
 }
 
-/// Gets the wheel with MuJoCo by pip, which compares its hash, and unpacks it below `out`.
+/// Gets the wheel with MuJoCo by pip, which compares its hash, and unpacks it in a folder of the user.
+///
+/// Not below `out`: `cargo install` deletes that folder, and the installed program loads the library from where it is.
 fn download(out: &Path) -> Result<PathBuf, String> {
-    let unpacked = out.join("wheel").join("mujoco");
-    if unpacked.join(format!("libmujoco.so.{DOWNLOADED}")).is_file() {
-        return Ok(unpacked);
+    for variable in ["XDG_DATA_HOME", "HOME"] {
+        println!("cargo::rerun-if-env-changed={variable}");
     }
     let target = |variable: &str| env::var(variable).unwrap_or_default();
     let (arch, os) = (target("CARGO_CFG_TARGET_ARCH"), target("CARGO_CFG_TARGET_OS"));
@@ -154,16 +155,26 @@ fn download(out: &Path) -> Result<PathBuf, String> {
     let Some((_, platform, hash)) = wheel else {
         return Err(format!("the feature `download` has no MuJoCo for {arch} {os}; set MUJOCO_DIR instead"));
     };
-    let failed = |error: std::io::Error| format!("{}: {error}", out.display());
-    let (requirements, wheels, scratch) = (out.join("wheel.txt"), out.join("wheels"), out.join("wheel.tmp"));
-    // A folder of an earlier build that is not complete, or has another version, cannot be the target of the rename.
-    let complete = out.join("wheel");
-    for folder in [&wheels, &scratch, &complete] {
-        if folder.exists() {
-            fs::remove_dir_all(folder).map_err(failed)?;
-        }
+    let data = data_folder(out);
+    let complete = data.join(format!("mujoco-{DOWNLOADED}-{arch}"));
+    let unpacked = complete.join("mujoco");
+    let is_complete = || unpacked.join(format!("libmujoco.so.{DOWNLOADED}")).is_file();
+    if is_complete() {
+        return Ok(unpacked);
     }
-    fs::write(&requirements, format!("mujoco-core=={DOWNLOADED} --hash=sha256:{hash}\n")).map_err(failed)?;
+    let (requirements, wheels) = (out.join("wheel.txt"), out.join("wheels"));
+    // In the folder of the result, so that it can be renamed; other builds may unpack at the same time.
+    let scratch = data.join(format!("mujoco-{DOWNLOADED}-{arch}.{}.tmp", std::process::id()));
+    for folder in [&wheels, &scratch] {
+        remove(folder)?;
+    }
+    let failed = |path: &Path| {
+        let path = path.display().to_string();
+        move |error: std::io::Error| format!("{path}: {error}")
+    };
+    fs::create_dir_all(&scratch).map_err(failed(&scratch))?;
+    let requirement = format!("mujoco-core=={DOWNLOADED} --hash=sha256:{hash}\n");
+    fs::write(&requirements, requirement).map_err(failed(&requirements))?;
     let mut pip = Command::new("python3");
     pip.args(["-m", "pip", "download", "--no-input", "--disable-pip-version-check", "--quiet", "--no-deps"])
         .args(["--only-binary=:all:", "--python-version", "3.11", "--platform", platform, "--require-hashes"])
@@ -172,12 +183,31 @@ fn download(out: &Path) -> Result<PathBuf, String> {
         .arg("--dest")
         .arg(&wheels);
     run(&mut pip)?;
-    let wheel = fs::read_dir(&wheels).map_err(failed)?.flatten().next();
+    let wheel = fs::read_dir(&wheels).map_err(failed(&wheels))?.flatten().next();
     let wheel = wheel.ok_or("pip downloaded no wheel of mujoco-core")?.path();
     run(Command::new("python3").args(["-m", "zipfile", "-e"]).arg(&wheel).arg(&scratch))?;
-    // Renamed at the end: a folder of that name is complete.
-    fs::rename(&scratch, complete).map_err(failed)?;
+    // Renamed at the end: a folder of that name with the library is complete.
+    if fs::rename(&scratch, &complete).is_err() && !is_complete() {
+        remove(&complete)?;
+        fs::rename(&scratch, &complete).map_err(failed(&complete))?;
+    }
+    remove(&scratch)?;
+    remove(&wheels)?;
     Ok(unpacked)
+}
+
+/// Folder for data of the user, `~/.local/share/kinetoscope`; below `out` without a home folder.
+fn data_folder(out: &Path) -> PathBuf {
+    let absolute = |variable: &str| env::var_os(variable).map(PathBuf::from).filter(|path| path.is_absolute());
+    let home = absolute("XDG_DATA_HOME").or_else(|| absolute("HOME").map(|home| home.join(".local/share")));
+    home.map_or_else(|| out.to_path_buf(), |folder| folder.join("kinetoscope"))
+}
+
+fn remove(folder: &Path) -> Result<(), String> {
+    match fs::remove_dir_all(folder) {
+        Err(error) if error.kind() != std::io::ErrorKind::NotFound => Err(format!("{}: {error}", folder.display())),
+        _ => Ok(()),
+    }
 }
 
 /// Runs a command; its messages are part of the error.

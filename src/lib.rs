@@ -7,11 +7,15 @@ pub mod assets;
 mod book;
 #[cfg(all(feature = "record", feature = "viewer"))]
 mod file_recording;
+#[cfg(feature = "record")]
+mod foxglove_stream;
 #[cfg(all(feature = "record", feature = "viewer"))]
 mod recording_playback;
 
 #[cfg(all(feature = "record", feature = "viewer"))]
 pub use file_recording::FileRecording;
+#[cfg(feature = "record")]
+pub use foxglove_stream::FoxgloveStream;
 pub use kinetoscope_exec as exec;
 pub use kinetoscope_look as look;
 pub use kinetoscope_mujoco as mujoco;

@@ -2,7 +2,7 @@
 //! without. The sensor measures in every step and keeps six measurements. The sides are created in both orders, half
 //! the time each.
 
-use crate::interleave::{Contender, MeasurementCfg, in_both_orders, measure};
+use crate::interleave::{Contender, compare};
 use crate::row::Row;
 use crate::settings::{BenchResult, Settings};
 use kinetoscope::prelude::*;
@@ -65,11 +65,7 @@ impl Contender for Quadrupeds {
 }
 
 pub(crate) fn run(settings: &Settings) -> BenchResult<Vec<Row>> {
-    let times = in_both_orders(|order| {
-        let (mut with, mut without) = order.create(|| Quadrupeds::new(true), || Quadrupeds::new(false))?;
-        let plan = MeasurementCfg { seconds: 0.5 * settings.seconds, restart_after: STEPS };
-        measure(plan, &mut [&mut with, &mut without])
-    })?;
+    let times = compare(settings.seconds, STEPS, || Quadrupeds::new(true), || Quadrupeds::new(false))?;
     let micros = |side: usize| 1e6 / times.rate(side, ENVS);
     Ok(vec![
         Row::new("contacts", format!("quadruped, {ENVS} envs"), "us/env-step", 1, micros(0))

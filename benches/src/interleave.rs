@@ -120,6 +120,21 @@ pub(crate) fn in_both_orders(mut measurement: impl FnMut(Order) -> BenchResult<T
     Ok(BothOrders([one(Order::OursFirst)?, one(Order::BaselineFirst)?]))
 }
 
+/// Compares two sides in [both orders](in_both_orders) for `seconds` in all: side 0 is `ours`, side 1 `baseline`. The work
+/// restarts once a side has done `restart_after` steps.
+pub(crate) fn compare<A: Contender, B: Contender>(
+    seconds: f64,
+    restart_after: u32,
+    ours: impl Fn() -> BenchResult<A>,
+    baseline: impl Fn() -> BenchResult<B>,
+) -> BenchResult<BothOrders> {
+    in_both_orders(|order| {
+        let (mut ours, mut baseline) = order.create(&ours, &baseline)?;
+        let plan = MeasurementCfg { seconds: seconds / 2.0, restart_after };
+        measure(plan, &mut [&mut ours, &mut baseline])
+    })
+}
+
 impl BothOrders {
     /// Mean rate of one side with `count` items per step \[1/s\].
     pub(crate) fn rate(&self, side: usize, count: usize) -> f64 {

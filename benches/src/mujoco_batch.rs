@@ -3,7 +3,7 @@
 //! the two, rates are means.
 
 use crate::baseline::{self, Process};
-use crate::interleave::{Contender, MeasurementCfg, in_both_orders, measure};
+use crate::interleave::{Contender, MeasurementCfg, compare, measure};
 use crate::models::{Case, STEPS};
 use crate::mujoco_batch_reads;
 use crate::row::Row;
@@ -23,12 +23,12 @@ pub(crate) fn run(settings: &Settings) -> BenchResult<Vec<Row>> {
     let mut rows = Vec::new();
     for case in Case::humanoid()?.into_iter().chain([Case::sr5()?]) {
         for (envs, threads) in ENVS.into_iter().flat_map(|envs| THREADS.map(|threads| (envs, threads))) {
-            let plan = |share| MeasurementCfg { seconds: share * settings.seconds, restart_after: STEPS };
             let ours = || Ours::new(&case, envs, threads);
             let row =
                 |rate| Row::new("mujoco-batch", format!("{}, {envs} envs", case.name), "env-steps/s", threads, rate);
             let Some(python) = &python else {
-                let times = measure(plan(0.25), &mut [&mut ours()?])?;
+                let plan = MeasurementCfg { seconds: 0.25 * settings.seconds, restart_after: STEPS };
+                let times = measure(plan, &mut [&mut ours()?])?;
                 rows.push(row(envs as f64 / times.per_step(0)).without("mujoco.batch"));
                 continue;
             };
@@ -37,11 +37,8 @@ pub(crate) fn run(settings: &Settings) -> BenchResult<Vec<Row>> {
                 (Reads::OtherPackage, mjbatch.as_ref(), "mjbatch on MuJoCo 3.14.0"),
             ] {
                 let Some(python) = python else { continue };
-                let times = in_both_orders(|order| {
-                    let start = || Baseline::start(python, &case, (envs, threads), reads);
-                    let (mut ours, mut baseline) = order.create(ours, start)?;
-                    measure(plan(0.5), &mut [&mut ours, &mut baseline])
-                })?;
+                let start = || Baseline::start(python, &case, (envs, threads), reads);
+                let times = compare(settings.seconds, STEPS, ours, start)?;
                 let rate = |side: usize| times.rate(side, envs);
                 rows.push(row(rate(0)).against(name, rate(1), times.ratio(0, 1)).with_target_ratio(1.0));
             }

@@ -6,7 +6,7 @@
 //! the same physics; this is checked bit by bit.
 
 use crate::baseline;
-use crate::interleave::{Contender, MeasurementCfg, in_both_orders, measure};
+use crate::interleave::{Contender, compare};
 use crate::models::{Case, HUMANOID, STEPS, arm_and_hand_cfg};
 use crate::mujoco_batch::{Baseline, ENVS, Reads, THREADS};
 use crate::row::Row;
@@ -27,14 +27,12 @@ pub(crate) fn run(settings: &Settings) -> BenchResult<Vec<Row>> {
         for (envs, threads) in ENVS.into_iter().flat_map(|envs| THREADS.map(|threads| (envs, threads))) {
             let name = format!("{}, {envs} envs, poses and forces", case.name);
             eprintln!("  {name}");
-            let times = in_both_orders(|order| {
-                let (mut ours, mut theirs) = order.create(
-                    || Ours::new(&case, &entity, envs, threads),
-                    || Baseline::start(&python, &case, (envs, threads), Reads::PosesAndForces),
-                )?;
-                let plan = MeasurementCfg { seconds: 0.5 * settings.seconds, restart_after: STEPS };
-                measure(plan, &mut [&mut ours, &mut theirs])
-            })?;
+            let times = compare(
+                settings.seconds,
+                STEPS,
+                || Ours::new(&case, &entity, envs, threads),
+                || Baseline::start(&python, &case, (envs, threads), Reads::PosesAndForces),
+            )?;
             let rate = |side: usize| times.rate(side, envs);
             rows.push(
                 Row::new("mujoco-batch", name, "env-steps/s", threads, rate(0))

@@ -1,7 +1,7 @@
 //! Steps of standing quadrupeds with a height scanner, contact sensors on their feet and an IMU, each at its rate and
 //! read at its rate, compared with the same quadrupeds without sensors. The ratio is the share of the physics.
 
-use crate::interleave::{Contender, MeasurementCfg, in_both_orders, measure};
+use crate::interleave::{Contender, compare};
 use crate::row::Row;
 use crate::settings::{BenchResult, Settings};
 use kinetoscope::prelude::*;
@@ -22,12 +22,8 @@ const STEPS_PER_SCAN: u32 = 4;
 pub(crate) fn run(settings: &Settings) -> BenchResult<Vec<Row>> {
     let mut rows = Vec::new();
     for envs in ENVS {
-        let times = in_both_orders(|order| {
-            let (mut with, mut without) =
-                order.create(|| Quadrupeds::new(envs, true), || Quadrupeds::new(envs, false))?;
-            let plan = MeasurementCfg { seconds: 0.5 * settings.seconds, restart_after: STEPS };
-            measure(plan, &mut [&mut with, &mut without])
-        })?;
+        let with = || Quadrupeds::new(envs, true);
+        let times = compare(settings.seconds, STEPS, with, || Quadrupeds::new(envs, false))?;
         let micros = |side: usize| 1e6 / times.rate(side, envs);
         let name = format!("quadruped, {envs} envs, scanner 50 Hz, contacts and IMU 200 Hz");
         rows.push(Row::new("sensors", name, "us/env-step", THREADS, micros(0)).against(

@@ -4,7 +4,7 @@
 //! Sixteen of the vendor's arms with the bundled hand move all the time. Each image of 960 x 540 pixels shows all of
 //! them. The window is in a headless X server (Xvfb), which takes its share of the machine.
 
-use crate::interleave::{Contender, MeasurementCfg, in_both_orders, measure};
+use crate::interleave::{Contender, compare};
 use crate::models::{arm_with_hand, drive_sr5};
 use crate::row::Row;
 use crate::settings::{BenchResult, Settings};
@@ -202,11 +202,7 @@ pub(crate) fn run(settings: &Settings) -> BenchResult<Vec<Row>> {
         eprintln!("  without the window: Xvfb is not there");
     }
     let window = display.map(|display| measure_window(&arm, &display, settings.seconds)).transpose()?;
-    let times = in_both_orders(|order| {
-        let (mut watched, mut alone) = order.create(|| Arms::new(&arm, true), || Arms::new(&arm, false))?;
-        let plan = MeasurementCfg { seconds: settings.seconds / 2.0, restart_after: 10 * SWING };
-        measure(plan, &mut [&mut watched, &mut alone])
-    })?;
+    let times = compare(settings.seconds, 10 * SWING, || Arms::new(&arm, true), || Arms::new(&arm, false))?;
     let case = |what: &str| format!("{ENVS} x {} + hand, {what}", arm.name);
     let [width, height] = SIZE;
     let mut rows = Vec::new();

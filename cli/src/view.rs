@@ -3,12 +3,12 @@
 use crate::command_status::{CommandStatus, Result};
 use crate::interrupt;
 use crate::model::{ModelArgs, Setup, SpawnArgs};
-use kinetoscope::FileRecording;
 use kinetoscope::prelude::*;
 use kinetoscope::record::RecorderCfg;
 use kinetoscope::viewer::{
     Closed, Command, RecordButton, ServeCfg, SnapshotRequest, Speed, Viewer, ViewerExt, Window, WindowCfg, WindowError,
 };
+use kinetoscope::{FileRecording, FoxgloveStream};
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -29,7 +29,7 @@ pub(crate) struct Args {
     #[arg(long, value_name = "ADDR", num_args = 0..=1, default_missing_value = "127.0.0.1:8080")]
     serve: Option<String>,
     /// Also stream all recorded topics to Foxglove, which connects to ws://127.0.0.1:8765 or to the given port; an address
-    /// before the port (0.0.0.0:8765) lets all machines read them. Build with --features foxglove
+    /// that other machines can reach (0.0.0.0:8765) requires the printed token. Build with --features foxglove
     #[arg(long, value_name = "PORT", num_args = 0..=1, default_missing_value = "8765")]
     foxglove: Option<String>,
     /// Number of environments, side by side [default: that of a scene file, else 1]
@@ -91,8 +91,9 @@ pub(crate) fn run(args: &Args) -> Result<CommandStatus> {
             .map_err(|error| format!("--record {error}"))?;
     }
     let with_flag = |error| format!("--foxglove: {error}");
-    let stream = args.foxglove.as_deref().map(|address| stream_to_foxglove(&mut sim, address));
-    let end_stream = stream.transpose().map_err(with_flag)?;
+    let stream = args.foxglove.as_deref().map(|address| FoxgloveStream::start(&mut sim, address));
+    let stream = stream.transpose().map_err(with_flag)?;
+    stream.iter().for_each(|stream| println!("{stream}"));
     let window = args.open_view(&mut sim, RecordButton::shared(Arc::clone(&files)))?;
     let closed = || window.as_ref().and_then(Window::closed);
     let mut step = 0;
@@ -104,8 +105,8 @@ pub(crate) fn run(args: &Args) -> Result<CommandStatus> {
     for recorded in recorded.map_err(|error| format!("--record {error}"))? {
         println!("Recorded to {recorded}");
     }
-    if let Some(end) = end_stream {
-        end(&mut sim).map_err(with_flag)?;
+    if let Some(stream) = stream {
+        stream.end(&mut sim).map_err(with_flag)?;
     }
     if let Some(reason) = closed().as_ref().and_then(Closed::error) {
         return Err(format!("the window was lost after {step} steps: {reason}").into());
@@ -143,27 +144,6 @@ impl Args {
         println!("A window shows {names}: H in it shows its keys; closing it, or Ctrl+C here, ends it.");
         Ok(Some(window))
     }
-}
-
-/// Ends a stream to Foxglove. Its error is the one that had stopped the stream.
-type EndStream = Box<dyn FnOnce(&mut SimulationManager) -> Result<()>>;
-
-/// Streams the simulation to Foxglove until the returned function is called.
-///
-/// # Errors
-/// The address is invalid or in use, or there is nothing to stream.
-#[cfg(feature = "foxglove")]
-fn stream_to_foxglove(sim: &mut SimulationManager, address: &str) -> Result<EndStream> {
-    use kinetoscope::record::{FoxgloveCfg, StreamToFoxglove as _};
-    let server = sim.stream_to_foxglove(FoxgloveCfg::at(address)?)?;
-    println!("Open {} in Foxglove (Open connection, Foxglove WebSocket)", server.url());
-    Ok(Box::new(move |sim| Ok(server.close(sim)?)))
-}
-
-/// Always fails: this build has no streams.
-#[cfg(not(feature = "foxglove"))]
-fn stream_to_foxglove(_: &mut SimulationManager, _: &str) -> Result<EndStream> {
-    Err("this build does not stream to Foxglove: build with `--features foxglove`".into())
 }
 
 /// Returns the error message for a window that cannot be opened, with alternatives.

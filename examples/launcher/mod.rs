@@ -3,7 +3,6 @@
 
 pub(crate) mod arm;
 pub(crate) mod cloud;
-pub(crate) mod curve;
 pub(crate) mod grip;
 pub(crate) mod image_file;
 pub(crate) mod live_view;
@@ -47,7 +46,7 @@ pub(crate) struct Launcher {
     #[arg(long, value_name = "ADDR", num_args = 0..=1, default_missing_value = SERVE)]
     pub(crate) serve: Option<String>,
     /// Also stream all recorded topics to Foxglove, which connects to ws://127.0.0.1:8765 or to the given port; an address
-    /// before the port (0.0.0.0:8765) lets all machines read them. Build with --features foxglove
+    /// that other machines can reach (0.0.0.0:8765) requires the printed token. Build with --features foxglove
     #[arg(long, value_name = "PORT", num_args = 0..=1, default_missing_value = "8765")]
     pub(crate) foxglove: Option<String>,
     /// Device of the physics: cpu; cuda and cuda:N are refused with an explanation

@@ -1,11 +1,11 @@
 //! Recording flags of the examples, for builds with the features `record` and `viewer`.
 
 use super::{Launcher, Result};
-#[cfg(all(feature = "record", feature = "viewer"))]
-use kinetoscope::FileRecording;
 use kinetoscope::prelude::*;
 #[cfg(all(feature = "record", feature = "viewer"))]
 use kinetoscope::record::{RecorderCfg, Topic};
+#[cfg(all(feature = "record", feature = "viewer"))]
+use kinetoscope::{FileRecording, FoxgloveStream};
 
 #[cfg(all(feature = "record", feature = "viewer"))]
 mod recorded {
@@ -36,8 +36,9 @@ mod recorded {
         /// The file cannot be written, its format cannot hold any stream of this example, or the address of `--foxglove`
         /// is invalid or in use.
         pub(crate) fn start_recording(&self, sim: &mut SimulationManager) -> Result<Recording> {
-            let stream = self.foxglove.as_deref().map(|address| stream_to_foxglove(sim, address));
-            let end_stream = stream.transpose().map_err(|error| format!("--foxglove: {error}"))?;
+            let stream = self.foxglove.as_deref().map(|address| FoxgloveStream::start(sim, address));
+            let stream = stream.transpose().map_err(|error| format!("--foxglove: {error}"))?;
+            stream.iter().for_each(|stream| println!("{stream}"));
             let files = self.recording();
             if self.record.is_some() {
                 let begun = files.lock().unwrap_or_else(PoisonError::into_inner).start(sim);
@@ -48,24 +49,8 @@ mod recorded {
                     reported: false,
                 });
             }
-            Ok(Recording { files: Arc::clone(files), end_stream })
+            Ok(Recording { files: Arc::clone(files), stream })
         }
-    }
-
-    /// Ends a stream to Foxglove. Its error is the one that had stopped the stream.
-    type EndStream = Box<dyn Fn(&mut SimulationManager) -> Result>;
-
-    #[cfg(feature = "foxglove")]
-    fn stream_to_foxglove(sim: &mut SimulationManager, address: &str) -> Result<EndStream> {
-        use kinetoscope::record::{FoxgloveCfg, StreamToFoxglove as _};
-        let server = sim.stream_to_foxglove(FoxgloveCfg::at(address)?)?;
-        println!("Open {} in Foxglove (Open connection, Foxglove WebSocket)", server.url());
-        Ok(Box::new(move |sim| Ok(server.close(sim)?)))
-    }
-
-    #[cfg(not(feature = "foxglove"))]
-    fn stream_to_foxglove(_: &mut SimulationManager, _: &str) -> Result<EndStream> {
-        Err("this build does not stream to Foxglove: build with `--features foxglove`".into())
     }
 
     /// `cfg` with the topics that `--record-view` selects.
@@ -115,7 +100,7 @@ mod recorded {
     /// The recording that `--record` or the record button has begun, and the stream of `--foxglove`, if any.
     pub(crate) struct Recording {
         files: Arc<Mutex<FileRecording>>,
-        end_stream: Option<EndStream>,
+        stream: Option<FoxgloveStream>,
     }
 
     impl Recording {
@@ -128,9 +113,8 @@ mod recorded {
             for recorded in ended.map_err(|error| format!("--record {error}"))? {
                 println!("Recorded to {recorded}");
             }
-            self.end_stream
-                .as_ref()
-                .map_or(Ok(()), |end| end(sim).map_err(|error| format!("--foxglove: {error}").into()))
+            let stream = self.stream.as_ref();
+            stream.map_or(Ok(()), |stream| stream.end(sim).map_err(|error| format!("--foxglove: {error}").into()))
         }
     }
 }

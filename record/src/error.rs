@@ -1,7 +1,6 @@
 //! Errors of recording, reading and replay.
 
 use crate::format::{Format, extensions_text};
-use std::net::SocketAddr;
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -236,20 +235,13 @@ pub enum RecordError {
         /// The partial file, if it can be read.
         partial_file: Option<PathBuf>,
     },
-    /// The text is no address of a server.
-    #[error("{given:?} is no address: use a port such as 8765, or an address and a port such as 127.0.0.1:8765")]
-    Address {
-        /// The text.
-        given: String,
-    },
-    /// A server cannot listen at an address.
-    #[error("cannot listen at {address}: {error}; choose another port, or 0 for a free one")]
-    Listen {
-        /// The address.
-        address: SocketAddr,
-        /// Cause.
-        error: Arc<std::io::Error>,
-    },
+    /// This build does not stream to Foxglove.
+    #[error("this build does not stream to Foxglove: build with the feature `foxglove` (`--features foxglove`)")]
+    NoFoxglove,
+    /// A server cannot be started.
+    #[cfg(feature = "foxglove")]
+    #[error(transparent)]
+    Serve(Arc<kinetoscope_http::ServeError>),
     /// A limit of the format is exceeded.
     #[error("{path}: {what}")]
     Limit {
@@ -283,6 +275,13 @@ pub enum RecordError {
         /// Problem.
         what: String,
     },
+}
+
+#[cfg(feature = "foxglove")]
+impl From<kinetoscope_http::ServeError> for RecordError {
+    fn from(error: kinetoscope_http::ServeError) -> Self {
+        Self::Serve(Arc::new(error))
+    }
 }
 
 impl From<kinetoscope_sim::Error> for RecordError {

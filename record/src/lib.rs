@@ -32,6 +32,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 #![forbid(unsafe_code)]
+#![cfg_attr(docsrs, feature(doc_cfg))]
 
 mod animation;
 mod archive;
@@ -73,6 +74,8 @@ mod writer;
 pub use cfg::RecorderCfg;
 pub use error::{RecordError, Result};
 pub use format::Format;
+#[cfg(feature = "foxglove")]
+pub use kinetoscope_http::ServeError;
 #[cfg(feature = "foxglove")]
 pub use live::{FoxgloveCfg, FoxgloveServer, StreamToFoxglove};
 pub use overview::OverviewCfg;

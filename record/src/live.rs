@@ -8,38 +8,46 @@
 //! waits for clients: rows are dropped while all packets are in use, and the oldest messages of a slow client are
 //! dropped.
 
+mod gate;
 mod server;
 mod sink;
 #[cfg(test)]
 mod tests;
 
 use crate::cfg::RecorderCfg;
-use crate::error::{RecordError, Result};
+use crate::error::Result;
 use crate::format::Format;
 use crate::overview::OverviewCfg;
 use crate::recorder::Recorder;
 use crate::ros_writer::RosWriter;
 use crate::topic::Topic;
+use kinetoscope_http::parse_address;
 use kinetoscope_sim::{EnvId, Observer, ObserverId, SimEvent, SimulationManager};
 use serde::{Deserialize, Serialize};
 use server::LiveServer;
 use sink::{ClientSink, FoxgloveWriter};
 use std::any::Any;
 use std::fmt;
-use std::net::{IpAddr, Ipv4Addr, SocketAddr};
+use std::net::{Ipv4Addr, SocketAddr};
 use std::path::PathBuf;
 use std::sync::Arc;
 
 /// Port that Foxglove suggests.
 const DEFAULT_PORT: u16 = 8765;
+/// Origin of Foxglove in a browser.
+const FOXGLOVE: &str = "https://app.foxglove.dev";
 
 /// Configuration of a live stream to Foxglove.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct FoxgloveCfg {
-    /// Address that the server listens on. Port 0 selects a free port. Everyone who can reach the address can read the
-    /// messages, also pages of a browser on this machine. Clients cannot change the simulation.
+    /// Address that the server listens on. Port 0 selects a free port. All programs on this machine can connect; other
+    /// machines can if the address is not a loopback address, with the token in [`FoxgloveServer::url`]. Clients cannot
+    /// change the simulation.
     pub address: SocketAddr,
+    /// Origins of the websites whose pages can connect, `https://app.foxglove.dev` by default. Programs that are not
+    /// websites need no entry, such as the desktop application (`file://`). `null` accepts sandboxed pages of all websites.
+    pub websites: Vec<String>,
     /// Topics of the stream.
     pub topics: Vec<Topic>,
     /// Environments, at least one, in any order without repetitions; `None` for all.
@@ -58,7 +66,7 @@ impl Default for FoxgloveCfg {
     fn default() -> Self {
         let RecorderCfg { topics, envs, period_steps, stream_periods, overview, .. } = RecorderCfg::default();
         let address = SocketAddr::from((Ipv4Addr::LOCALHOST, DEFAULT_PORT));
-        Self { address, topics, envs, period_steps, stream_periods, overview }
+        Self { address, websites: vec![FOXGLOVE.into()], topics, envs, period_steps, stream_periods, overview }
     }
 }
 
@@ -69,27 +77,15 @@ impl FoxgloveCfg {
     /// # Errors
     /// The text is no such address.
     pub fn at(address: &str) -> Result<Self> {
-        let text = address.trim().replace("localhost", "127.0.0.1");
-        let found = text.parse().ok().or_else(|| {
-            let port = text.parse().ok().map(|port| SocketAddr::from((Ipv4Addr::LOCALHOST, port)));
-            port.or_else(|| text.parse().ok().map(|ip: IpAddr| SocketAddr::new(ip, DEFAULT_PORT)))
-        });
-        match found {
-            Some(address) => Ok(Self { address, ..Self::default() }),
-            None => Err(RecordError::Address { given: address.into() }),
-        }
+        Ok(Self { address: parse_address(address, DEFAULT_PORT)?, ..Self::default() })
     }
 
     /// The settings of the recorder, whose path appears in error messages.
     fn recorder(&self) -> RecorderCfg {
-        let Self { address, topics, envs, period_steps, stream_periods, overview } = self.clone();
-        let (path, format) = (PathBuf::from(url(address)), Some(Format::Mcap));
+        let Self { address, websites: _, topics, envs, period_steps, stream_periods, overview } = self.clone();
+        let (path, format) = (PathBuf::from(format!("ws://{address}")), Some(Format::Mcap));
         RecorderCfg { path, format, topics, envs, period_steps, stream_periods, overview, ..RecorderCfg::default() }
     }
-}
-
-fn url(address: SocketAddr) -> String {
-    format!("ws://{address}")
 }
 
 /// Live streams of a simulation.
@@ -98,7 +94,7 @@ pub trait StreamToFoxglove {
     /// stepped. Of entities that are added later, only fixed ones are in the stream, as a part of the scene.
     ///
     /// # Errors
-    /// The server cannot listen at the address, or an error of [`Record::record`](crate::Record::record) that does not
+    /// The server cannot listen at the address, a website is not an origin, or an error of [`Record::record`](crate::Record::record) that does not
     /// concern a file.
     fn stream_to_foxglove(&mut self, cfg: FoxgloveCfg) -> Result<FoxgloveServer>;
 }
@@ -106,7 +102,7 @@ pub trait StreamToFoxglove {
 impl StreamToFoxglove for SimulationManager {
     fn stream_to_foxglove(&mut self, cfg: FoxgloveCfg) -> Result<FoxgloveServer> {
         let sink = ClientSink::new();
-        let server = Arc::new(LiveServer::start(cfg.address, &sink)?);
+        let server = Arc::new(LiveServer::start(cfg.address, cfg.websites.clone(), &sink)?);
         let address = server.address();
         let recorder_cfg = FoxgloveCfg { address, ..cfg }.recorder();
         let clients = Arc::clone(&server);
@@ -116,7 +112,9 @@ impl StreamToFoxglove for SimulationManager {
         })?;
         let observer =
             self.observers_mut().add(FoxgloveObserver { recorder, server: Arc::clone(&server), has_failed: false });
-        tracing::info!(target: "kinetoscope_record", %address, "streaming to Foxglove");
+        // The token stays out of the event: logs are read by more people than may read the stream.
+        let has_token = !address.ip().is_loopback();
+        tracing::info!(target: "kinetoscope_record", %address, has_token, "streaming to Foxglove");
         Ok(FoxgloveServer { server, observer })
     }
 }
@@ -135,9 +133,9 @@ impl FoxgloveServer {
         self.server.address()
     }
 
-    /// Address for Foxglove's dialog "Open connection", such as `ws://127.0.0.1:8765`.
-    pub fn url(&self) -> String {
-        url(self.address())
+    /// Address for Foxglove's dialog "Open connection", such as `ws://127.0.0.1:8765`, with the token if one is required.
+    pub fn url(&self) -> &str {
+        self.server.url()
     }
 
     /// Number of connected clients; 0 after the stream has ended.

@@ -245,11 +245,6 @@ impl FormatWriter for NpzWriter {
         Ok(())
     }
 
-    fn flush(&mut self) -> WriteResult {
-        // An archive is not readable before its end.
-        Ok(())
-    }
-
     fn finish(&mut self, streams: &[StreamSchema]) -> WriteResult<u64> {
         let storage = self.storage.take().ok_or_else(|| io::Error::other("the archive was finished twice"))?;
         let mut archive = ArchiveWriter::new(BufWriter::with_capacity(1 << 16, storage));

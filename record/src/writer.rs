@@ -51,9 +51,11 @@ pub(crate) trait FormatWriter: Send {
     /// Writes the content of a packet.
     fn write(&mut self, streams: &[StreamSchema], packet: &Packet) -> WriteResult;
 
-    /// Writes buffered data to the file, so that it survives a kill of the process. Does nothing in formats that are
-    /// not readable before their end.
-    fn flush(&mut self) -> WriteResult;
+    /// Writes buffered data to the file, so that it survives a kill of the process. By default does nothing, for formats
+    /// that are not readable before their end.
+    fn flush(&mut self) -> WriteResult {
+        Ok(())
+    }
 
     /// Completes the file, renames it to its final name, and returns its size \[bytes\]. Called once.
     fn finish(&mut self, streams: &[StreamSchema]) -> WriteResult<u64>;

@@ -7,12 +7,17 @@ use crate::test;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 
+/// The package that users depend on.
+const FACADE: &str = "kinetoscope";
 /// Folder of the committed declarations of MuJoCo 2.2.2.
 const DECLARATIONS: &str = "mujoco-sys/docs_rs";
 
 /// Checks the manifests and makes all packages, without compiling them again.
 pub(crate) fn run(repo: &Repo, ready: &Prepared) -> XtaskResult {
     let packages = published(&repo.metadata);
+    if !packages.iter().any(|package| package["name"] == FACADE) {
+        return Err(Failure::new(format!("{FACADE} is not published: its manifest says `publish = false`")));
+    }
     let findings: Vec<String> = packages.iter().flat_map(|package| mistakes(package)).collect();
     no_findings("manifests are not ready for publication", &findings)?;
     let mut cargo = ready.cargo().args(["package", "--no-verify", "--allow-dirty", "--quiet"]);
@@ -36,12 +41,33 @@ pub(crate) fn docs_rs(repo: &Repo, ready: &Prepared) -> XtaskResult {
     let folder = if in_ci() { repo.target.clone() } else { repo.target.join("docs-rs") };
     let cargo = ready.cargo().env("DOCS_RS", "1").env("MUJOCO_DIR", repo.target.join("without-mujoco"));
     let cargo = cargo.env("CARGO_TARGET_DIR", &folder).env("RUSTDOCFLAGS", "-D warnings");
-    let features = ["download", "foxglove", "lerobot", "relocated-assets"].map(|name| format!("kinetoscope/{name}"));
+    let features: Vec<String> =
+        docs_rs_features(&repo.metadata)?.iter().map(|name| format!("{FACADE}/{name}")).collect();
     cargo
-        .args(["doc", "--no-deps", "--package", "kinetoscope"])
+        .args(["doc", "--no-deps", "--package", FACADE])
         .args(test::SHARED_FEATURES)
         .args(["--features", &features.join(",")])
         .run()
+}
+
+/// Features that docs.rs enables for the facade.
+///
+/// # Errors
+/// The manifest names none: the items behind them would have no documentation.
+fn docs_rs_features(metadata: &Value) -> XtaskResult<Vec<&str>> {
+    let mut packages = metadata["packages"].as_array().into_iter().flatten();
+    let facade = packages.find(|package| package["name"] == FACADE).unwrap_or(&Value::Null);
+    let features = facade["metadata"]["docs"]["rs"]["features"].as_array().into_iter().flatten();
+    let features: Vec<&str> = features.filter_map(Value::as_str).collect();
+    let declared = facade["features"].as_object().into_iter().flatten().map(|(name, _)| name.as_str());
+    // `internals` is for tests of this workspace.
+    let documented = declared.filter(|name| !["default", "internals", "record", "viewer"].contains(name));
+    let missing: Vec<&str> = documented.filter(|name| !features.contains(name)).collect();
+    if features.is_empty() || !missing.is_empty() {
+        let message = format!("[package.metadata.docs.rs] of {FACADE} has features {features:?}, not {missing:?}");
+        return Err(Failure::new(message));
+    }
+    Ok(features)
 }
 
 /// The output folder of the build script of the package in `folder`, from cargo's messages.
@@ -131,6 +157,23 @@ mod tests {
         let messages = [other, message("look", "/out/1"), message("sys", "/out/2")].join("\n");
         assert_eq!(out_dir(&messages, Path::new("/a/sys")), Some(PathBuf::from("/out/2")));
         assert_eq!(out_dir(&messages, Path::new("/a/robot")), None);
+    }
+
+    #[test]
+    fn features_of_docs_rs() {
+        let with = |features: Value| {
+            let declared = json!({"default": ["record"], "record": [], "viewer": [], "lerobot": [], "internals": []});
+            json!({"packages": [
+                {"name": "other"},
+                {"name": FACADE, "features": declared, "metadata": {"docs": {"rs": {"features": features}}}},
+            ]})
+        };
+        assert_eq!(docs_rs_features(&with(json!(["lerobot"]))).expect("complete"), ["lerobot"]);
+        for features in [json!([]), json!(null), json!(["download"])] {
+            let failure = docs_rs_features(&with(features)).expect_err("the feature lerobot is missing");
+            assert!(failure.message.contains("not [\"lerobot\"]"), "{failure}");
+        }
+        assert!(docs_rs_features(&json!({"packages": []})).is_err());
     }
 
     #[test]

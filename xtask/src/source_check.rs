@@ -7,9 +7,10 @@ use std::path::Path;
 /// The only places with unsafe code: generated bindings, the crate that calls them, and the thread pool.
 const UNSAFE_ALLOWED_IN: [&str; 3] = ["mujoco-sys/src/lib.rs", "mujoco/src/", "exec/src/workers.rs"];
 /// Crates that forbid unsafe code.
-const FORBID_UNSAFE: [&str; 9] = [
+const FORBID_UNSAFE: [&str; 10] = [
     "scene/src/lib.rs",
     "look/src/lib.rs",
+    "http/src/lib.rs",
     "python/render/src/lib.rs",
     "robot/src/lib.rs",
     "render/src/lib.rs",

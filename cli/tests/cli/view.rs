@@ -58,11 +58,11 @@ fn foxglove() {
     let address = line.split("ws://").nth(1).and_then(|rest| rest.split(' ').next()).unwrap();
     assert!(std::net::TcpStream::connect(address).is_ok(), "{line}");
     let err = shell.run_refused(&format!("view arm.urdf --serve 127.0.0.1:0 --foxglove {address}"));
-    assert!(err.contains("--foxglove: cannot listen at") && err.contains(address), "{err}");
+    assert!(err.contains("--foxglove: cannot serve at") && err.contains(address), "{err}");
     running.interrupt();
     assert_eq!(running.ended().code(), Some(0));
     let err = shell.run_refused("view arm.urdf --serve 127.0.0.1:0 --foxglove robot");
-    assert!(err.contains("--foxglove: \"robot\" is no address"), "{err}");
+    assert!(err.contains("--foxglove: cannot serve at \"robot\""), "{err}");
 }
 
 #[cfg(not(feature = "foxglove"))]

@@ -107,11 +107,6 @@ impl FormatWriter for Animation {
         Ok(())
     }
 
-    fn flush(&mut self) -> WriteResult {
-        // An animation is not readable before its end.
-        Ok(())
-    }
-
     fn finish(&mut self, _streams: &[StreamSchema]) -> WriteResult<u64> {
         self.encode_pending(None)?;
         let Some(mut file) = self.file.take().filter(|_| self.first.is_some()) else {

@@ -256,11 +256,6 @@ impl<D: DatasetWriter> FormatWriter for EpisodeSplitter<D> {
         Ok(())
     }
 
-    fn flush(&mut self) -> WriteResult {
-        // A dataset is not readable before its end.
-        Ok(())
-    }
-
     fn finish(&mut self, _streams: &[StreamSchema]) -> WriteResult<u64> {
         (0..self.envs.len()).try_for_each(|k| self.end_episode(k))?;
         self.dataset.finish()

@@ -1,20 +1,28 @@
 //! The WebSocket server of a live stream.
 
+use super::gate::Gate;
 use super::sink::ClientSink;
-use crate::error::{RecordError, Result};
 use foxglove::websocket::Capability;
 use foxglove::{FoxgloveError, WebSocketServer, WebSocketServerHandle};
+use kinetoscope_http::{AccessPolicy, ServeError, Token, listen, random_loopback, reachable_address};
 use std::fmt;
 use std::io;
 use std::net::SocketAddr;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Mutex, PoisonError};
 use std::thread;
 
 /// A running server.
 pub(super) struct LiveServer {
     address: SocketAddr,
+    /// Address for clients, with the token if one is required.
+    url: String,
     /// `None` once the server was stopped.
-    handle: Mutex<Option<WebSocketServerHandle>>,
+    running: Mutex<Option<Running>>,
+}
+
+struct Running {
+    gate: Gate,
+    handle: WebSocketServerHandle,
 }
 
 impl fmt::Debug for LiveServer {
@@ -24,30 +32,40 @@ impl fmt::Debug for LiveServer {
 }
 
 impl LiveServer {
-    /// Starts a server for the channels of a sink.
+    /// Starts a server for the channels of a sink. Programs on this machine, pages of `websites`, and with a token other
+    /// machines can connect.
     ///
     /// # Errors
-    /// The address is in use or does not belong to this machine, or the operating system provides no thread.
-    pub(super) fn start(address: SocketAddr, sink: &ClientSink) -> Result<Self> {
-        let host = match address {
-            SocketAddr::V4(address) => address.ip().to_string(),
-            SocketAddr::V6(address) => format!("[{}]", address.ip()),
-        };
+    /// The address is in use or does not belong to this machine, a website is not an origin, or the operating system
+    /// provides no thread or no random numbers.
+    pub(super) fn start(asked: SocketAddr, websites: Vec<String>, sink: &ClientSink) -> Result<Self, ServeError> {
+        let listener = listen(asked)?;
+        let address = listener.local_addr().map_err(|error| ServeError::Listen { address: asked, error })?;
+        let token = if address.ip().is_loopback() { None } else { Some(Token::random()?) };
+        let token_query = token.as_ref().map_or_else(String::new, |token| format!("/?token={}", token.as_str()));
+        let url = format!("ws://{}{token_query}", reachable_address(address));
+        let policy = AccessPolicy::new(address, token).with_websites(websites)?;
+        let inner = random_loopback()?;
         let server = WebSocketServer::new()
             .name("kinetoscope")
             .context(sink.context())
-            .bind(host, address.port())
+            .bind(inner.to_string(), 0)
             .capabilities([Capability::Time])
             .listener(sink.held());
-        let failed = |error| RecordError::Listen { address, error: Arc::new(error) };
+        let failed = |error| ServeError::System(format!("the server for Foxglove: {error}"));
         let handle = start(server).map_err(failed)?;
-        let address = SocketAddr::new(address.ip(), handle.port());
-        Ok(Self { address, handle: Mutex::new(Some(handle)) })
+        let gate = Gate::open(listener, policy, SocketAddr::from((inner, handle.port()))).map_err(failed)?;
+        Ok(Self { address, url, running: Mutex::new(Some(Running { gate, handle })) })
     }
 
     /// Address and port that the server listens on.
     pub(super) fn address(&self) -> SocketAddr {
         self.address
+    }
+
+    /// Address for clients, with the token if one is required.
+    pub(super) fn url(&self) -> &str {
+        &self.url
     }
 
     /// Number of connected clients; 0 after [`stop`](Self::stop).
@@ -62,15 +80,16 @@ impl LiveServer {
 
     /// Disconnects all clients and stops listening.
     pub(super) fn stop(&self) {
-        let handle = self.handle.lock().unwrap_or_else(PoisonError::into_inner).take();
-        if let Some(handle) = handle {
-            // The tasks of clients end on their own after the closing handshake.
+        let running = self.running.lock().unwrap_or_else(PoisonError::into_inner).take();
+        if let Some(Running { gate, handle }) = running {
+            // The tasks of clients end on their own after the closing handshake, which the gate passes on.
             handle.stop().detach_all();
+            drop(gate);
         }
     }
 
     fn with_handle<T>(&self, read: impl FnOnce(&WebSocketServerHandle) -> T) -> Option<T> {
-        self.handle.lock().unwrap_or_else(PoisonError::into_inner).as_ref().map(read)
+        self.running.lock().unwrap_or_else(PoisonError::into_inner).as_ref().map(|running| read(&running.handle))
     }
 }
 

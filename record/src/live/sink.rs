@@ -134,11 +134,6 @@ impl FormatWriter for FoxgloveWriter {
         Ok(())
     }
 
-    /// Does nothing: messages wait in no buffer of the writer.
-    fn flush(&mut self) -> WriteResult {
-        Ok(())
-    }
-
     fn finish(&mut self, _: &[StreamSchema]) -> WriteResult<u64> {
         Ok(0)
     }

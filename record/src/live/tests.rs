@@ -286,13 +286,107 @@ fn failed_stream() {
     assert!(error.contains("joints"), "{error}");
 }
 
+/// Response to the request of a client with further headers, at an address of the server.
+fn response(address: SocketAddr, path: &str, headers: &[(&'static str, &str)]) -> u16 {
+    let mut request = format!("ws://{address}{path}").into_client_request().unwrap();
+    let protocol = ("Sec-WebSocket-Protocol", "foxglove.sdk.v1");
+    for &(name, value) in [protocol].iter().chain(headers) {
+        request.headers_mut().insert(name, HeaderValue::from_str(value).unwrap());
+    }
+    match tungstenite::connect(request) {
+        Ok((_, response)) => response.status().as_u16(),
+        Err(tungstenite::Error::Http(response)) => response.status().as_u16(),
+        Err(error) => panic!("{error}"),
+    }
+}
+
+/// Pages of other websites cannot read the stream: not from their own address, and not by a host name of their own that
+/// leads to this machine.
+#[test]
+fn websites() {
+    let mut sim = sim(cfg(1, 1));
+    let topics = vec![Topic::Events];
+    let mut start = |websites: &[&str]| {
+        let websites = websites.iter().map(ToString::to_string).collect();
+        let server = sim.stream_to_foxglove(FoxgloveCfg { websites, topics: topics.clone(), ..any_port() });
+        server.map(|server| server.address())
+    };
+    let default: Vec<String> = FoxgloveCfg::default().websites;
+    let named = start(&default.iter().map(String::as_str).collect::<Vec<_>>()).unwrap();
+    let [none, other] = [&[][..], &["http://localhost:3000"]].map(|websites| start(websites).unwrap());
+    for (origin, by_default, without, by_other) in [
+        ("https://app.foxglove.dev", 101, 403, 403),
+        ("http://localhost:3000", 403, 403, 101),
+        ("https://example.org", 403, 403, 403),
+        ("null", 403, 403, 403),
+        ("file://", 101, 101, 101),
+    ] {
+        let got = [named, none, other].map(|address| response(address, "", &[("Origin", origin)]));
+        assert_eq!(got, [by_default, without, by_other], "{origin}");
+    }
+    for (host, status) in [("localhost:8765", 101), ("example.org:8765", 403)] {
+        assert_eq!(response(named, "", &[("Host", host)]), status, "{host}");
+    }
+    let error = start(&["app.foxglove.dev"]).unwrap_err().to_string();
+    assert!(error.contains("\"app.foxglove.dev\" is no origin"), "{error}");
+}
+
+/// Other machines need the token.
+#[test]
+fn token() {
+    let mut sim = sim(cfg(1, 1));
+    let at = FoxgloveCfg { topics: vec![Topic::Events], ..FoxgloveCfg::at("0.0.0.0:0").unwrap() };
+    let server = sim.stream_to_foxglove(at).unwrap();
+    let address = SocketAddr::from((Ipv4Addr::LOCALHOST, server.address().port()));
+    let token = server.url().split_once("/?token=").unwrap().1.to_string();
+    assert_eq!(token.len(), 32);
+    for (path, status) in [
+        (String::new(), 403),
+        ("/?token=".into(), 403),
+        (format!("/?token={}", &token[1..]), 403),
+        (format!("/?token={token}"), 101),
+    ] {
+        assert_eq!(response(address, &path, &[]), status, "{path}");
+    }
+    let page = [("Origin", "https://example.org")];
+    assert_eq!(response(address, &format!("/?token={token}"), &page), 403, "a website that knows the token");
+    // Loopback addresses need none.
+    let local = sim.stream_to_foxglove(FoxgloveCfg { topics: vec![Topic::Events], ..any_port() }).unwrap();
+    assert_eq!(local.url(), format!("ws://{}", local.address()));
+}
+
+/// Connections that send nothing, something else or too much get no stream, and do not keep others from connecting.
+#[test]
+fn other_requests() {
+    use std::io::{Read as _, Write as _};
+    let mut sim = sim(cfg(1, 1));
+    let server = sim.stream_to_foxglove(FoxgloveCfg { topics: vec![Topic::Events], ..any_port() }).unwrap();
+    let _silent: Vec<TcpStream> = (0..20).map(|_| TcpStream::connect(server.address()).unwrap()).collect();
+    let long = format!("GET / HTTP/1.1\r\nHost: localhost\r\nCookie: {}", "a".repeat(1 << 14));
+    for (request, status) in [
+        ("SSH-2.0-OpenSSH_9.2\r\n\r\n", "400"),
+        ("GET / HTTP/1.1\r\n\r\n", "400"),
+        ("GET / HTTP/1.1\r\nHost: localhost\r\n\r\n", "426"),
+        (long.as_str(), "431"),
+    ] {
+        let mut stream = TcpStream::connect(server.address()).unwrap();
+        stream.set_read_timeout(Some(Duration::from_secs(20))).unwrap();
+        stream.write_all(request.as_bytes()).unwrap();
+        let mut response = Vec::new();
+        let _ = stream.read_to_end(&mut response);
+        let response = String::from_utf8_lossy(&response).into_owned();
+        assert!(response.starts_with(&format!("HTTP/1.1 {status}")), "{request:.40}: {response}");
+    }
+    assert_eq!(response(server.address(), "", &[]), 101);
+}
+
 #[test]
 fn errors() {
     let mut sim = sim(cfg(1, 1));
     let server = sim.stream_to_foxglove(FoxgloveCfg { topics: vec![Topic::Events], ..any_port() }).unwrap();
     let again = FoxgloveCfg { address: server.address(), topics: vec![Topic::Events], ..FoxgloveCfg::default() };
     let error = sim.stream_to_foxglove(again).unwrap_err();
-    assert!(matches!(error, RecordError::Listen { address, .. } if address == server.address()), "{error}");
+    assert!(error.to_string().contains(&format!("port {} is in use", server.address().port())), "{error}");
     for (topics, period_steps, text) in [
         (vec![Topic::JointStates("arm".into())], 1, "arm"),
         (vec![Topic::Everything], 1, "nothing to record"),
@@ -316,7 +410,7 @@ fn addresses() {
     ] {
         assert_eq!(FoxgloveCfg::at(text).unwrap().address.to_string(), address, "{text}");
     }
-    for text in ["", "port", "65536", "robot:80", "127.0.0.1:", "-1"] {
+    for text in ["port", "65536", "robot:80", "127.0.0.1:", "-1"] {
         let error = FoxgloveCfg::at(text).unwrap_err();
         assert!(error.to_string().contains(&format!("{text:?}")), "{error}");
     }

@@ -35,10 +35,6 @@ impl<F: FnMut(&Packet) + Send> FormatWriter for FnWriter<F> {
         Ok(())
     }
 
-    fn flush(&mut self) -> WriteResult {
-        Ok(())
-    }
-
     fn finish(&mut self, _streams: &[StreamSchema]) -> WriteResult<u64> {
         Ok(0)
     }

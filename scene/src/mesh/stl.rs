@@ -2,6 +2,10 @@
 //!
 //! Normals in the file are ignored: correct normals repeat the winding, and without normals a vertex that several
 //! triangles share is one vertex.
+//!
+//! The `stl_io` crate, version 0.11.0, decides by the first six bytes alone. To see it, pass these files to its `read_stl`:
+//! `"SOLID a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid\n"`, and
+//! the same with `"solid\n"` as its first line. Both are read as binary files, and end too early.
 
 use super::builder::{Builder, Corner};
 use super::error::ReadContext;

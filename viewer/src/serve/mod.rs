@@ -21,31 +21,27 @@
 //! Each viewer has its own thread, which renders images of the newest [`Snapshot`](crate::Snapshot). Only one viewer of
 //! a server renders at a time, so all viewers together use at most one core. The simulation does not wait for images.
 
-mod access_policy;
-mod address;
 mod command;
-mod error;
 mod page;
-mod request_head;
-mod response;
 mod server;
 mod state;
-mod token;
 mod view_backend;
 mod viewer_session;
 mod websocket_session;
 
-pub use error::ServeError;
+pub use kinetoscope_http::ServeError;
 
 use crate::control::{RecordButton, SnapshotRequest, Speed, ViewerExt};
-use access_policy::AccessPolicy;
+use kinetoscope_http::{AccessPolicy, Token, listen, parse_address, reachable_address};
 use kinetoscope_sim::{Observer, ObserverId, SimEvent, SimulationManager};
 use serde::{Deserialize, Serialize};
 use server::{Server, ServerContext};
 use std::net::SocketAddr;
 use std::sync::{Arc, Weak};
-use token::Token;
 use viewer_session::ViewerHub;
+
+/// Port of an address without a port.
+const DEFAULT_PORT: u16 = 8080;
 
 /// Settings of the browser view.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -133,13 +129,13 @@ pub trait Serve {
 impl Serve for SimulationManager {
     fn serve_with(&mut self, address: &str, mut cfg: ServeCfg) -> Result<ServerHandle, ServeError> {
         let (button, max_viewers) = (cfg.record_button.take(), cfg.max_viewers);
-        let asked = address::parse(address)?;
-        let listener = address::listen(asked)?;
+        let asked = parse_address(address, DEFAULT_PORT)?;
+        let listener = listen(asked)?;
         let address = listener.local_addr().map_err(|error| ServeError::Listen { address: asked, error })?;
         let token = if address.ip().is_loopback() { None } else { Some(Token::random()?) };
         let token_query = token.as_ref().map_or_else(String::new, |token| format!("?token={}", token.as_str()));
         let has_token = token.is_some();
-        let url = format!("http://{}/{token_query}", address::reachable_address(address));
+        let url = format!("http://{}/{token_query}", reachable_address(address));
         // Requests two snapshots per second. A new viewer thus starts with a state at most half a second old, even if
         // the program does not step then.
         let host_viewer = self.viewer(SnapshotRequest { rate: 2.0, ..SnapshotRequest::default() });

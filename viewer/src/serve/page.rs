@@ -1,7 +1,9 @@
 //! The web page: a single HTML file with embedded styles and scripts.
 
+use std::net::TcpStream;
+
 /// Returns the page. Its styles and scripts carry `nonce`, and the browser accepts no others.
-pub(super) fn html(nonce: &str) -> String {
+fn html(nonce: &str) -> String {
     const PAGE: &str = include_str!("page/index.html");
     const STYLE: &str = include_str!("page/page.css");
     const PARTS: [&str; 5] = [
@@ -12,6 +14,16 @@ pub(super) fn html(nonce: &str) -> String {
         include_str!("page/page.js"),
     ];
     PAGE.replace("NONCE", nonce).replace("/*STYLE*/", STYLE).replace("/*PROGRAM*/", &PARTS.join("\n"))
+}
+
+/// Sends the page with status 200.
+pub(super) fn send(stream: &mut TcpStream, nonce: &str, with_body: bool) {
+    let policy = format!(
+        "default-src 'none'; script-src 'nonce-{nonce}'; style-src 'nonce-{nonce}'; connect-src 'self'; img-src blob: \
+         data:; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+    );
+    let more = [("Content-Security-Policy", policy.as_str()), ("Content-Type", "text/html; charset=utf-8")];
+    kinetoscope_http::send(stream, "200 OK", &more, &html(nonce), with_body);
 }
 
 #[cfg(test)]

@@ -1,11 +1,8 @@
 //! HTTP server with one thread per connection, and limits on the number of connections.
 
-use super::access_policy::AccessPolicy;
-use super::error::ServeError;
-use super::request_head::RequestHead;
-use super::response::{self, Status};
 use super::view_backend::ViewBackend;
 use super::{page, websocket_session};
+use kinetoscope_http::{AccessPolicy, RequestHead, ServeError, Status, random_hex, send_error};
 use std::collections::BTreeMap;
 use std::io::Write;
 use std::net::{Shutdown, TcpListener, TcpStream};
@@ -209,20 +206,20 @@ fn serve_connection(stream: &mut TcpStream, context: &ServerContext) {
         Ok(Some(head)) => head,
         Ok(None) => return,
         // The method of a request that cannot be parsed is unknown.
-        Err(status) => return response::send_error(stream, status, true),
+        Err(status) => return send_error(stream, status, true),
     };
     let with_body = head.method != "HEAD";
     if let Err(status) = context.policy.check(&head) {
-        return response::send_error(stream, status, with_body);
+        return send_error(stream, status, with_body);
     }
     match (head.method.as_str(), head.path.as_str()) {
-        ("GET" | "HEAD", "/" | "/index.html") => match super::token::random_hex() {
-            Ok(nonce) => response::send_page(stream, &page::html(&nonce), &nonce, with_body),
-            Err(_) => response::send_error(stream, Status::InternalError, with_body),
+        ("GET" | "HEAD", "/" | "/index.html") => match random_hex() {
+            Ok(nonce) => page::send(stream, &nonce, with_body),
+            Err(_) => send_error(stream, Status::InternalError, with_body),
         },
         ("GET", WEBSOCKET_PATH) => upgrade(stream, context, head),
-        ("GET" | "HEAD", _) => response::send_error(stream, Status::NotFound, with_body),
-        _ => response::send_error(stream, Status::MethodNotAllowed, with_body),
+        ("GET" | "HEAD", _) => send_error(stream, Status::NotFound, with_body),
+        _ => send_error(stream, Status::MethodNotAllowed, with_body),
     }
 }
 
@@ -233,10 +230,10 @@ fn upgrade(stream: &mut TcpStream, context: &ServerContext, head: RequestHead) {
     // Sixteen bytes in base64.
     let key = head.header("sec-websocket-key").ok().flatten().filter(|key| key.len() == 24);
     let Some(key) = key.filter(|_| asks && version == Some("13")) else {
-        return response::send_error(stream, Status::UpgradeRequired, true);
+        return send_error(stream, Status::UpgradeRequired, true);
     };
     let Some(slot) = ViewerSlot::acquire(context) else {
-        return response::send_error(stream, Status::ServiceUnavailable, true);
+        return send_error(stream, Status::ServiceUnavailable, true);
     };
     let switch = format!(
         "HTTP/1.1 101 Switching Protocols\r\nUpgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Accept: {}\r\n\r\n",

@@ -4,7 +4,6 @@
 //! a few may be unacknowledged at a time. A slow viewer therefore gets fewer images, and always the newest.
 
 use super::command::{Command, Seen};
-use super::response;
 use super::server::ServerContext;
 use super::view_backend::ViewSession;
 use serde_json::json;
@@ -77,7 +76,7 @@ pub(super) fn run_session(
     while viewer.poll(stream).is_ok() {}
     drop(viewer);
     // The browser reads the close reason before the connection ends.
-    response::drain(stream);
+    kinetoscope_http::drain(stream);
 }
 
 impl<S: Read + Write> WebSocketSession<'_, S> {

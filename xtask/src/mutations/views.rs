@@ -49,11 +49,11 @@ pub(super) const VIEWS: &[Mutation] = &[
         &["playback::tests::seek_step_and_play"],
     ),
     Mutation::of(
-        "kinetoscope-viewer",
+        "kinetoscope-http",
         "first letters of a token are enough",
-        "viewer/src/serve/token.rs",
+        "http/src/token.rs",
         ["self.0.as_bytes().ct_eq", "self.0.as_bytes()[..given.len().min(self.0.len())].ct_eq"],
-        &["serve::token::tests::equality"],
+        &["token::tests::equality"],
     ),
     Mutation::of(
         "kinetoscope-viewer",

@@ -1,15 +1,16 @@
-//! Access token of views that other machines can reach.
+//! Random numbers that others cannot guess: the access token of servers that other machines can reach, and addresses.
 
-use super::error::ServeError;
+use crate::error::ServeError;
 use std::fmt;
+use std::net::Ipv4Addr;
 use subtle::ConstantTimeEq;
 
 /// Number of random bytes of a token: 128 bits cannot be guessed.
 const TOKEN_BYTES: usize = 16;
 
-/// A random secret that grants access to a view.
+/// A random secret that grants access to a server.
 #[derive(Clone, PartialEq, Eq)]
-pub(super) struct Token(String);
+pub struct Token(String);
 
 impl fmt::Debug for Token {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -19,34 +20,63 @@ impl fmt::Debug for Token {
 
 impl Token {
     /// Creates a random token.
-    pub(super) fn random() -> Result<Self, ServeError> {
+    ///
+    /// # Errors
+    /// The operating system provides no random numbers.
+    pub fn random() -> Result<Self, ServeError> {
         Ok(Self(random_hex()?))
     }
 
     /// Returns the token as used in the URL.
-    pub(super) fn as_str(&self) -> &str {
+    pub fn as_str(&self) -> &str {
         &self.0
     }
 
     /// True if `given` equals the token. The comparison takes constant time, so its duration reveals nothing about the
     /// token.
-    pub(super) fn matches(&self, given: &str) -> bool {
+    pub fn matches(&self, given: &str) -> bool {
         // The length is not secret.
         self.0.as_bytes().ct_eq(given.as_bytes()).into()
     }
 }
 
+/// A random address of 127.0.0.0/8. Pages in a browser cannot find a server by trying all 16 million addresses, each with
+/// all ports.
+///
+/// # Errors
+/// The operating system provides no random numbers.
+pub fn random_loopback() -> Result<Ipv4Addr, ServeError> {
+    let [a, b, c, ..] = random_bytes()?;
+    // Neither 127.0.x.y, where other servers listen, nor addresses of networks and broadcasts.
+    Ok(Ipv4Addr::new(127, 1 + a % 254, b, 1 + c % 254))
+}
+
 /// Returns 32 random hexadecimal digits.
-pub(super) fn random_hex() -> Result<String, ServeError> {
+///
+/// # Errors
+/// The operating system provides no random numbers.
+pub fn random_hex() -> Result<String, ServeError> {
+    Ok(random_bytes()?.iter().map(|byte| format!("{byte:02x}")).collect())
+}
+
+fn random_bytes() -> Result<[u8; TOKEN_BYTES], ServeError> {
     let mut bytes = [0; TOKEN_BYTES];
     getrandom::fill(&mut bytes).map_err(|error| ServeError::System(format!("no random numbers: {error}")))?;
-    Ok(bytes.iter().map(|byte| format!("{byte:02x}")).collect())
+    Ok(bytes)
 }
 
 #[cfg(test)]
 #[allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
 mod tests {
     use super::*;
+
+    #[test]
+    fn loopback_addresses() {
+        let [first, second] = [(); 2].map(|()| random_loopback().unwrap());
+        assert!(first.is_loopback() && second.is_loopback() && first.octets()[1] != 0, "{first} {second}");
+        // Two equal addresses by chance: once in 16 million runs.
+        assert_ne!(first, second);
+    }
 
     /// A token equals only itself, and is not printed by `Debug`.
     #[test]

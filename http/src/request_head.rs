@@ -1,6 +1,6 @@
 //! Parser of HTTP request heads, with limits on size and duration.
 
-use super::response::Status;
+use crate::response::Status;
 use std::io::{ErrorKind, Read};
 use std::net::TcpStream;
 use std::time::{Duration, Instant};
@@ -9,30 +9,34 @@ use std::time::{Duration, Instant};
 const MAX_BYTES: usize = 16 << 10;
 /// Maximum number of headers.
 const MAX_HEADERS: usize = 96;
-/// Timeout of a complete request head. Clients that send a byte per second are refused.
-const READ_TIMEOUT: Duration = Duration::from_secs(5);
-
 /// A parsed HTTP request head.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) struct RequestHead {
-    pub(super) method: String,
+pub struct RequestHead {
+    /// Method, such as `GET`.
+    pub method: String,
     /// Path without the query.
-    pub(super) path: String,
+    pub path: String,
     /// Query without the question mark.
-    pub(super) query: String,
+    pub query: String,
     headers: Vec<(String, String)>,
     /// Bytes received after the head.
-    pub(super) rest: Vec<u8>,
+    pub rest: Vec<u8>,
 }
 
 impl RequestHead {
-    /// Reads a request head. Returns `None` if the client sent nothing, or if the connection failed.
-    pub(super) fn read(stream: &mut TcpStream) -> Result<Option<Self>, Status> {
+    /// Timeout of a complete request head. Clients that send a byte per second are refused.
+    pub const READ_TIMEOUT: Duration = Duration::from_secs(5);
+
+    /// Reads a request head, at most 16 KiB within 5 s. Returns `None` if the client sent nothing, or if the connection failed.
+    ///
+    /// # Errors
+    /// The status of a response for a request that is malformed, too large or too slow.
+    pub fn read(stream: &mut TcpStream) -> Result<Option<Self>, Status> {
         let start = Instant::now();
         let mut bytes = Vec::new();
         let mut chunk = [0; 2048];
         loop {
-            let left = READ_TIMEOUT.saturating_sub(start.elapsed());
+            let left = Self::READ_TIMEOUT.saturating_sub(start.elapsed());
             if left.is_zero() || stream.set_read_timeout(Some(left)).is_err() {
                 return Err(Status::Timeout);
             }
@@ -49,14 +53,14 @@ impl RequestHead {
             if let Some(head) = Self::parse(&bytes)? {
                 return Ok(Some(head));
             }
-            if bytes.len() >= MAX_BYTES {
-                return Err(Status::HeadTooLarge);
-            }
         }
     }
 
-    /// Parses a complete head, or returns `None` if more bytes are needed.
-    fn parse(bytes: &[u8]) -> Result<Option<Self>, Status> {
+    /// Parses the first bytes of a connection, or returns `None` if the head is not complete.
+    ///
+    /// # Errors
+    /// The status of a response for a request that is malformed or too large.
+    pub fn parse(bytes: &[u8]) -> Result<Option<Self>, Status> {
         let mut headers = [httparse::EMPTY_HEADER; MAX_HEADERS];
         let mut request = httparse::Request::new(&mut headers);
         let length = match request.parse(bytes) {
@@ -64,6 +68,7 @@ impl RequestHead {
             Ok(httparse::Status::Complete(_)) | Err(httparse::Error::TooManyHeaders) => {
                 return Err(Status::HeadTooLarge);
             }
+            Ok(httparse::Status::Partial) if bytes.len() >= MAX_BYTES => return Err(Status::HeadTooLarge),
             Ok(httparse::Status::Partial) => return Ok(None),
             Err(_) => return Err(Status::BadRequest),
         };
@@ -82,8 +87,11 @@ impl RequestHead {
         }))
     }
 
-    /// Returns the value of a header, by lower-case name. Duplicate headers are ambiguous and give an error.
-    pub(super) fn header(&self, name: &str) -> Result<Option<&str>, Status> {
+    /// Returns the value of a header, by lower-case name.
+    ///
+    /// # Errors
+    /// The header occurs several times, which is ambiguous.
+    pub fn header(&self, name: &str) -> Result<Option<&str>, Status> {
         let mut values = self.headers.iter().filter(|(n, _)| n == name).map(|(_, value)| value.as_str());
         match (values.next(), values.next()) {
             (value, None) => Ok(value),
@@ -92,13 +100,13 @@ impl RequestHead {
     }
 
     /// True if a comma-separated header contains a word.
-    pub(super) fn header_contains(&self, name: &str, word: &str) -> bool {
+    pub fn header_contains(&self, name: &str, word: &str) -> bool {
         let values = self.headers.iter().filter(|(n, _)| n == name);
         values.flat_map(|(_, value)| value.split(',')).any(|item| item.trim().eq_ignore_ascii_case(word))
     }
 
     /// Returns a value of the query.
-    pub(super) fn query(&self, key: &str) -> Option<&str> {
+    pub fn query(&self, key: &str) -> Option<&str> {
         self.query.split('&').filter_map(|pair| pair.split_once('=')).find(|(k, _)| *k == key).map(|(_, value)| value)
     }
 }
@@ -126,6 +134,9 @@ mod tests {
         for end in 1..text.len() - "more".len() {
             assert_eq!(parsed(&text[..end]), Ok(None), "{:?}", &text[..end]);
         }
+        let long = format!("GET / HTTP/1.1\r\nCookie: {}", "a".repeat(MAX_BYTES));
+        assert_eq!(parsed(&long[..MAX_BYTES - 1]), Ok(None));
+        assert_eq!(parsed(&long[..MAX_BYTES]), Err(Status::HeadTooLarge));
         let many: String = (0..=MAX_HEADERS).map(|k| format!("a{k}: b\r\n")).collect();
         assert_eq!(parsed(&format!("GET / HTTP/1.1\r\n{many}\r\n")), Err(Status::HeadTooLarge));
     }

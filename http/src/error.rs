@@ -1,8 +1,8 @@
-//! Errors of starting a browser view.
+//! Errors of starting a server.
 
 use std::net::SocketAddr;
 
-/// An error of starting a browser view.
+/// An error of starting a server.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ServeError {
@@ -36,6 +36,14 @@ pub enum ServeError {
         /// Error of the operating system.
         #[source]
         error: std::io::Error,
+    },
+    /// A text is not the origin of a website.
+    #[error(
+        "{given:?} is no origin of a website: write scheme, host and port without a path, such as https://example.org or http://localhost:8080"
+    )]
+    Origin {
+        /// The text.
+        given: String,
     },
     /// The operating system provides no random numbers or no thread.
     #[error("cannot serve: {0}")]

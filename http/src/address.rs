@@ -1,30 +1,33 @@
-//! Address parsing and listening of the browser view.
+//! Address parsing and listening.
 
-use super::error::ServeError;
+use crate::error::ServeError;
 use std::io::ErrorKind;
 use std::net::{IpAddr, Ipv4Addr, SocketAddr, TcpListener, UdpSocket};
 
-/// Default port.
-const DEFAULT_PORT: u16 = 8080;
+/// Port that needs no privileges, as a suggestion.
+const UNPRIVILEGED_PORT: u16 = 8080;
 /// Number of following ports that are tried as alternatives to a port in use.
 const PORT_CANDIDATES: u16 = 64;
 
-/// Parses an address such as `127.0.0.1:8080`, `[::1]:8080`, `localhost:8080`, `127.0.0.1` or `8080`. Host names other
-/// than `localhost` are not resolved.
-pub(super) fn parse(given: &str) -> Result<SocketAddr, ServeError> {
+/// Parses an address such as `127.0.0.1:8080`, `[::1]:8080`, `localhost:8080`, `127.0.0.1`, which gets the default port, or
+/// `8080`. Host names other than `localhost` are not resolved.
+///
+/// # Errors
+/// The text is no such address; the error suggests others.
+pub fn parse_address(given: &str, default_port: u16) -> Result<SocketAddr, ServeError> {
     let text = given.trim();
     let local = |port| SocketAddr::from((Ipv4Addr::LOCALHOST, port));
     if let Ok(address) = text.parse::<SocketAddr>() {
         return Ok(address);
     }
     if let Ok(ip) = text.trim_start_matches('[').trim_end_matches(']').parse::<IpAddr>() {
-        return Ok(SocketAddr::new(ip, DEFAULT_PORT));
+        return Ok(SocketAddr::new(ip, default_port));
     }
     if let Ok(port) = text.parse::<u16>() {
         return Ok(local(port));
     }
     let (host, port) = text.rsplit_once(':').unwrap_or((text, ""));
-    let wanted = if port.is_empty() { Some(DEFAULT_PORT) } else { port.parse::<u16>().ok() };
+    let wanted = if port.is_empty() { Some(default_port) } else { port.parse::<u16>().ok() };
     if let (true, Some(port)) = (host.is_empty() || host.eq_ignore_ascii_case("localhost"), wanted) {
         return Ok(local(port));
     }
@@ -32,13 +35,16 @@ pub(super) fn parse(given: &str) -> Result<SocketAddr, ServeError> {
         None => format!("invalid port {port:?}: ports are 0 to 65535"),
         Some(_) => format!("{host:?} is neither an IP address of this machine nor localhost"),
     };
-    let port = wanted.unwrap_or(DEFAULT_PORT);
+    let port = wanted.unwrap_or(default_port);
     let candidates = vec![local(port).to_string(), SocketAddr::from((Ipv4Addr::UNSPECIFIED, port)).to_string()];
     Err(ServeError::Address { given: given.into(), reason, candidates })
 }
 
-/// Listens at an address. If the port is in use, the error suggests the next free port.
-pub(super) fn listen(address: SocketAddr) -> Result<TcpListener, ServeError> {
+/// Listens at an address.
+///
+/// # Errors
+/// The operating system refuses. If the port is in use, the error suggests the next free port.
+pub fn listen(address: SocketAddr) -> Result<TcpListener, ServeError> {
     let error = match TcpListener::bind(address) {
         Ok(listener) => return Ok(listener),
         Err(error) => error,
@@ -47,7 +53,7 @@ pub(super) fn listen(address: SocketAddr) -> Result<TcpListener, ServeError> {
     match error.kind() {
         ErrorKind::AddrInUse => Err(ServeError::PortInUse { address, next: next_free(address) }),
         ErrorKind::PermissionDenied => {
-            let next = next_free(SocketAddr::new(ip, DEFAULT_PORT - 1));
+            let next = next_free(SocketAddr::new(ip, UNPRIVILEGED_PORT - 1));
             Err(ServeError::Address {
                 given: address.to_string(),
                 reason: format!(
@@ -76,7 +82,7 @@ fn next_free(address: SocketAddr) -> Option<SocketAddr> {
 
 /// Returns the address under which other machines reach the server. For an unspecified address, this is the IPv4
 /// address of the default network interface, or 127.0.0.1 without one.
-pub(super) fn reachable_address(address: SocketAddr) -> SocketAddr {
+pub fn reachable_address(address: SocketAddr) -> SocketAddr {
     if !address.ip().is_unspecified() {
         return address;
     }
@@ -111,7 +117,7 @@ mod tests {
             (" 10.0.0.7 ", "10.0.0.7:8080"),
             ("", "127.0.0.1:8080"),
         ] {
-            assert_eq!(parse(given).expect(given).to_string(), expected, "{given:?}");
+            assert_eq!(parse_address(given, 8080).expect(given).to_string(), expected, "{given:?}");
         }
         for (given, says, candidate) in [
             ("127.0.0.1:99999", "invalid port", "127.0.0.1:8080"),
@@ -120,7 +126,9 @@ mod tests {
             ("1.2.3:70", "neither an IP address", "127.0.0.1:70"),
             ("-1", "neither an IP address", "127.0.0.1:8080"),
         ] {
-            let Err(ServeError::Address { reason, candidates, .. }) = parse(given) else { panic!("{given:?}") };
+            let Err(ServeError::Address { reason, candidates, .. }) = parse_address(given, 8080) else {
+                panic!("{given:?}")
+            };
             assert!(reason.contains(says), "{given:?}: {reason}");
             assert_eq!(candidates[0], candidate, "{given:?}");
         }

@@ -12,15 +12,24 @@ const DRAIN_LIMIT: (usize, Duration) = (256 << 10, Duration::from_millis(300));
 
 /// Reason of a refused request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Status {
+pub enum Status {
+    /// The request violates HTTP.
     BadRequest,
+    /// The access policy refuses the request.
     Forbidden,
+    /// No such path.
     NotFound,
+    /// Neither GET nor HEAD.
     MethodNotAllowed,
+    /// The head was not complete in time.
     Timeout,
+    /// No WebSocket request of version 13.
     UpgradeRequired,
+    /// The head exceeds a limit.
     HeadTooLarge,
+    /// Too many connections.
     ServiceUnavailable,
+    /// The server failed.
     InternalError,
 }
 
@@ -57,18 +66,13 @@ impl Status {
     }
 }
 
-/// Sends the page with status 200.
-pub(super) fn send_page(stream: &mut TcpStream, html: &str, nonce: &str, with_body: bool) {
-    let policy = format!(
-        "default-src 'none'; script-src 'nonce-{nonce}'; style-src 'nonce-{nonce}'; connect-src 'self'; img-src blob: \
-         data:; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
-    );
-    let more = [("Content-Security-Policy", policy.as_str()), ("Content-Type", "text/html; charset=utf-8")];
-    send(stream, "200 OK", &more, html, with_body);
+/// Sends a status and an explanation, and closes the connection. Responses to HEAD requests have no body.
+pub fn send_error(stream: &mut TcpStream, status: Status, with_body: bool) {
+    write_and_close(stream, &error_response(status, with_body));
 }
 
-/// Sends a status and an explanation. Responses to HEAD requests have no body.
-pub(super) fn send_error(stream: &mut TcpStream, status: Status, with_body: bool) {
+/// The response with a status and an explanation. Responses to HEAD requests have no body.
+pub fn error_response(status: Status, with_body: bool) -> String {
     let more: &[(&str, &str)] = match status {
         Status::MethodNotAllowed => &[("Allow", "GET, HEAD")],
         Status::UpgradeRequired => &[("Upgrade", "websocket"), ("Sec-WebSocket-Version", "13")],
@@ -76,10 +80,16 @@ pub(super) fn send_error(stream: &mut TcpStream, status: Status, with_body: bool
         _ => &[],
     };
     let more: Vec<_> = more.iter().copied().chain([("Content-Type", "text/plain; charset=utf-8")]).collect();
-    send(stream, status.status_line(), &more, &format!("{}\n", status.explanation()), with_body);
+    response(status.status_line(), &more, &format!("{}\n", status.explanation()), with_body)
 }
 
-fn send(stream: &mut TcpStream, line: &str, more: &[(&str, &str)], body: &str, with_body: bool) {
+/// Sends a response with further headers, such as `("Content-Type", "text/html")`, and closes the connection. `line` is the
+/// status, such as `200 OK`.
+pub fn send(stream: &mut TcpStream, line: &str, more: &[(&str, &str)], body: &str, with_body: bool) {
+    write_and_close(stream, &response(line, more, body, with_body));
+}
+
+fn response(line: &str, more: &[(&str, &str)], body: &str, with_body: bool) -> String {
     let more: String = more.iter().map(|(name, value)| format!("{name}: {value}\r\n")).collect();
     let head = format!(
         "HTTP/1.1 {line}\r\n{more}Content-Length: {}\r\nCache-Control: no-store\r\nReferrer-Policy: no-referrer\r\n\
@@ -87,14 +97,18 @@ fn send(stream: &mut TcpStream, line: &str, more: &[(&str, &str)], body: &str, w
         body.len()
     );
     let body = if with_body { body } else { "" };
-    let sent = stream.set_write_timeout(Some(WRITE_TIMEOUT)).and_then(|()| stream.write_all((head + body).as_bytes()));
+    head + body
+}
+
+fn write_and_close(stream: &mut TcpStream, response: &str) {
+    let sent = stream.set_write_timeout(Some(WRITE_TIMEOUT)).and_then(|()| stream.write_all(response.as_bytes()));
     if sent.is_ok() {
         drain(stream);
     }
 }
 
 /// Ends the sending side of the connection, then reads the remaining request data, within limits.
-pub(super) fn drain(stream: &mut TcpStream) {
+pub fn drain(stream: &mut TcpStream) {
     let (most, time) = DRAIN_LIMIT;
     let start = Instant::now();
     let (mut seen, mut chunk) = (0, [0; 4096]);
