@@ -180,8 +180,8 @@ fn obstacles() {
 }
 
 /// Root cause of the failure: every obstacle filled all of its points, so that many large obstacles took the product of
-/// their number and their area. The same heights come from a count of 10,000 that fills points one by one, which is
-/// quick in a small field.
+/// their number and their area. In a small field, heights are compared with those of obstacles that fill their points
+/// one by one.
 #[test]
 fn many_obstacles() {
     let small =
@@ -229,6 +229,49 @@ fn platforms_between_points() {
         let expected = 0.5 * (0.05 * cells - half).min(0.5 * (0.1 * cells - platform));
         let tops = grid.platform_heights().expect("heights");
         assert!(tops.iter().all(|top| (top - expected).abs() < 1e-12), "{cells} {platform}: {tops}, not {expected}");
+    }
+}
+
+/// Heights of every type of tile, halfway between the easiest and the hardest, by closed forms: of the distance from the
+/// rim \[cells\], or as a set of values for random types.
+#[test]
+fn tiles() {
+    let cfg = TileCfg { size: [8.0, 8.0], cell: 0.1, platform: 2.0, seed: 7 };
+    // The platform begins 3 m from the rim. Stairs have treads of three cells, of which ten fit.
+    let by_rim = |name: &str, d: f64| match name {
+        "flat" => Some(0.0),
+        "slope_up" => Some(0.2 * 0.1 * d.min(30.0)),
+        "slope_down" => Some(-0.2 * 0.1 * d.min(30.0)),
+        "stairs_up" => Some(0.14 * (d / 3.0).floor().min(10.0)),
+        "stairs_down" => Some(-0.14 * (d / 3.0).floor().min(10.0)),
+        // A trench of 0.5 m, with a wall of one cell on each side.
+        "gap" => Some(if 25.0 < d && d < 30.0 { -1.0 } else { 0.0 }),
+        _ => None,
+    };
+    for tile in TerrainTile::all() {
+        let (name, heights) = (tile.name(), tile.heights(0.5, cfg).expect("heights"));
+        assert_eq!(heights.dim(), (81, 81), "{name}");
+        let mut distinct = std::collections::BTreeSet::new();
+        for ((r, c), &height) in heights.indexed_iter() {
+            distinct.insert(height.to_bits());
+            let wave = |k: usize| (std::f64::consts::TAU * 4.0 * k as f64 / 80.0).sin();
+            let exact = if name == "waves" {
+                Some(0.5 * 0.11 * (wave(r) + wave(c)))
+            } else {
+                by_rim(name, r.min(80 - r).min(c).min(80 - c) as f64)
+            };
+            let is_platform = (30..=50).contains(&r) && (30..=50).contains(&c);
+            let valid = match name {
+                _ if exact.is_some_and(|exact| (height - exact).abs() > 1e-12) => false,
+                "rough" => (height / 0.01 - (height / 0.01).round()).abs() < 1e-9 && height.abs() < 0.06 + 1e-12,
+                "boxes" => height.abs() <= 0.125 + 1e-12 && (height == 0.0 || !is_platform),
+                "stepping_stones" => height == 0.0 || height == -1.0 && !is_platform,
+                "discrete_obstacles" => height == 0.0 || (height - 0.125).abs() < 1e-12 && !is_platform,
+                _ => exact.is_some(),
+            };
+            assert!(valid, "{name}, row {r}, column {c}: {height}, not {exact:?}");
+        }
+        assert!(distinct.len() > 1 || name == "flat", "{name} is flat");
     }
 }
 
