@@ -34,8 +34,8 @@ use crate::error::{EnvError, Result, TermKind, TermResult};
 use crate::observation::ObservationTerm;
 use crate::reward::RewardTerm;
 use crate::space::Space;
-use kinetoscope_sim::{JointIndex, Robot, RobotId, SimulationManager};
-use ndarray::{Array1, Array2, Axis};
+use kinetoscope_sim::{JointIndex, RobotId, RobotState, SimulationManager};
+use ndarray::{Array1, Array2, ArrayView2, Axis};
 
 /// Checks that both ends of the range `field` of a term are finite and in order.
 fn check_range(kind: TermKind, name: &str, field: &str, [low, high]: [f64; 2]) -> Result<()> {
@@ -54,7 +54,7 @@ fn find_joints(sim: &SimulationManager, robot: RobotId, patterns: &[&str]) -> Re
     Ok((joints.iter().map(|joint| robot.joint_names()[joint.0].clone()).collect(), joints))
 }
 
-fn select_joints(of: &Array2<f64>, joints: &[JointIndex]) -> Array2<f64> {
+fn select_joints(of: ArrayView2<'_, f64>, joints: &[JointIndex]) -> Array2<f64> {
     of.select(Axis(1), &joints.iter().map(|joint| joint.0).collect::<Vec<_>>())
 }
 
@@ -72,7 +72,8 @@ pub fn joint_pos_rel(
     robot: RobotId,
     patterns: &[&str],
 ) -> Result<ObservationTerm> {
-    joint_observation(sim, name, robot, patterns, |robot| robot.qpos() - robot.default_qpos())
+    let initial = sim.robot(robot).default_qpos().row(0).to_owned();
+    joint_observation(sim, name, robot, patterns, RobotState::qpos, move |joint, position| position - initial[joint])
 }
 
 /// Joint velocities \[rad/s or m/s\]; columns as in [`joint_pos_rel`].
@@ -83,20 +84,31 @@ pub fn joint_pos_rel(
 /// # Panics
 /// The robot belongs to another manager.
 pub fn joint_vel(sim: &SimulationManager, name: &str, robot: RobotId, patterns: &[&str]) -> Result<ObservationTerm> {
-    joint_observation(sim, name, robot, patterns, |robot| robot.qvel())
+    joint_observation(sim, name, robot, patterns, RobotState::qvel, |_, velocity| velocity)
 }
 
-/// Creates a term with the columns of `read` for the joints that match `patterns`. `read` returns all joints, shape (N,
-/// dof).
+/// Creates a term with one column for each joint that matches `patterns`: `convert`, of the index of the joint and its
+/// number in `read`, which returns all joints, shape (N, dof).
 fn joint_observation(
     sim: &SimulationManager,
     name: &str,
     robot: RobotId,
     patterns: &[&str],
-    read: impl Fn(&Robot<'_>) -> Array2<f64> + Send + 'static,
+    read: fn(&RobotState) -> ArrayView2<'_, f64>,
+    convert: impl Fn(usize, f64) -> f64 + Send + 'static,
 ) -> Result<ObservationTerm> {
     let (names, joints) = find_joints(sim, robot, patterns)?;
-    Ok(ObservationTerm::new(name, names, move |now| Ok(select_joints(&read(&now.sim().robot(robot)), &joints))))
+    Ok(ObservationTerm::new(name, names, move |now| {
+        let all = read(now.robot(robot));
+        let value = |(env, k): (usize, usize)| convert(joints[k].0, all[(env, joints[k].0)]);
+        Ok(Array2::from_shape_fn((now.num_envs(), joints.len()), value))
+    }))
+}
+
+/// Sum over `joints`, for each environment, of `number`, of the index of the joint and its number in `all`, shape (N,
+/// dof).
+fn sum_over_joints(all: ArrayView2<'_, f64>, joints: &[JointIndex], number: impl Fn(usize, f64) -> f64) -> Array1<f64> {
+    all.map_axis(Axis(1), |row| joints.iter().map(|joint| number(joint.0, row[joint.0])).sum())
 }
 
 /// [`TermContext::actions`]; `names` are the names of all columns of the action space, in its order.
@@ -155,7 +167,8 @@ pub fn relative_joint_positions(
 ) -> Result<ActionTerm> {
     let (names, joints) = find_joints(sim, robot, patterns)?;
     Ok(ActionTerm::new(name, Space::uniform(names, [-1.0, 1.0])?, move |sim, actions| {
-        let targets = select_joints(&sim.robot(robot).qpos_target(), &joints) + actions.mapv(|action| step * action);
+        let targets =
+            select_joints(sim.robot(robot).qpos_target().view(), &joints) + actions.mapv(|action| step * action);
         Ok(sim.robot_mut(robot).set_qpos_target(&targets, Some(&joints), None)?)
     }))
 }
