@@ -11,18 +11,29 @@ macro_rules! terms {
 terms! {
     bad_orientation: bad_orientation;
     base_below: root_height_below_minimum;
-    base_motion: base_lin_vel, base_ang_vel, projected_gravity;
+    base_motion: base_lin_vel, base_ang_vel, base_pos_z, projected_gravity;
+    base_motion_penalties: ang_vel_xy_l2, lin_vel_z_l2;
     camera_images: camera_rgb, camera_depth, camera_mask;
+    feet_air_time: feet_air_time;
     flat_orientation: flat_orientation;
+    height_scan: height_scan;
     illegal_contact: illegal_contact;
+    joint_acc_l2: joint_acc_l2;
+    joint_deviation_l1: joint_deviation_l1;
     joint_effort_squares: joint_torques_l2;
     joint_out_of_limits: joint_out_of_limits;
+    joint_positions: joint_positions, JointPositionsCfg;
+    joint_state: joint_effort, joint_pos;
+    push_by_setting_velocity: push_by_setting_velocity;
+    randomize_property: randomize_friction, randomize_mass;
     reset_joints_by_offset: reset_joints_by_offset;
     reset_root_uniform: reset_root_uniform, RootRanges;
     terrain_levels: reset_root_on_terrain, terrain_levels, TerrainLevelsCfg;
     time_out: time_out;
+    track_ang_vel: track_ang_vel;
     track_lin_vel: track_lin_vel;
     uniform_command: uniform_command;
+    undesired_contacts: undesired_contacts;
     uniform_velocity: uniform_velocity, UniformVelocityCfg;
 }
 

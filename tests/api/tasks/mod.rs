@@ -17,3 +17,4 @@ mod task_text;
 mod terms;
 mod train_reach;
 mod vector_env;
+mod velocity_terms;
