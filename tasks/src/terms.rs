@@ -165,7 +165,7 @@ pub fn joint_efforts(
 /// [`joint_pos_rel`]; joints without a drive ignore them.
 ///
 /// # Errors
-/// A pattern is invalid or matches no joint, or two patterns match the same joint.
+/// A pattern is invalid or matches no joint, two patterns match the same joint, or `step` is not finite.
 ///
 /// # Panics
 /// The robot belongs to another manager.
@@ -176,6 +176,10 @@ pub fn relative_joint_positions(
     patterns: &[&str],
     step: f64,
 ) -> Result<ActionTerm> {
+    if !step.is_finite() {
+        let field = format!("step of the action term {name:?}");
+        return Err(EnvError::Config { field, value: step.to_string(), expected: "it must be finite" });
+    }
     let (names, joints) = find_joints(sim, robot, patterns)?;
     Ok(ActionTerm::new(name, Space::uniform(names, [-1.0, 1.0])?, move |sim, actions| {
         let targets =

@@ -296,14 +296,17 @@ fn rewards_and_terminations(all: &mut TermRegistry) {
     });
     all.add_termination("bad_orientation", |args| {
         let Angle { robot, angle } = args.params()?;
+        let angle = finite(args, "angle", angle)?;
         Ok(bad_orientation(args.name(), args.robot(robot.as_deref())?, angle))
     });
     all.add_termination("root_height_below_minimum", |args| {
         let Height { robot, height } = args.params()?;
+        let height = finite(args, "height", height)?;
         Ok(root_height_below_minimum(args.name(), args.robot(robot.as_deref())?, height))
     });
     all.add_termination("illegal_contact", |args| {
         let Force { sensor, force } = args.params()?;
+        let force = finite(args, "force", force)?;
         Ok(illegal_contact(args.name(), args.sensor::<ContactSensor>(&sensor)?, force))
     });
     all.add_termination("joint_out_of_limits", |args| joints(args, joint_out_of_limits));

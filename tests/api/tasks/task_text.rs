@@ -100,6 +100,7 @@ fn command(columns: &str) -> String {
 }
 
 const EFFORTS: &str = "type = \"joint_efforts\"\nrobot = \"cart\"\njoints = [\"slide\"]\nbound = 10";
+const LIMITS: &str = "type = \"joint_out_of_limits\"";
 const START: &str = "type = \"reset_joints_by_offset\"\npositions = [-0.1, 0.1]";
 const ALIVE: &str = "[rewards.alive]\ntype = \"is_alive\"";
 
@@ -176,6 +177,7 @@ fn mistakes() {
         (EFFORTS, "type = \"joint_positions\"\nscale = { slidr = 2 }", &["actions.push", "scale", "slidr", "slide"]),
         (EFFORTS, "type = \"joint_positions\"\nscale = nan", &["actions.push", "scale", "NaN", "finite"]),
         (EFFORTS, "type = \"joint_positions\"\nclip = [1, -1]", &["actions.push", "bounds of column", "slide"]),
+        (EFFORTS, "type = \"relative_joint_positions\"\nstep = nan", &["actions.push", "step", "NaN"]),
         (ALIVE, &*tracking("track_lin_vel", "x = [0, 1]", "1"), &["rewards.alive", "1 columns", "at least 2"]),
         (ALIVE, &*tracking("track_ang_vel", "x = [0, 1]\ny = [0, 1]", "1"), &["rewards.alive", "at least 3"]),
         (ALIVE, &*tracking("track_lin_vel", "x = [0, 1]\ny = [0, 1]", "0"), &["rewards.alive", "std is 0"]),
@@ -189,6 +191,8 @@ fn mistakes() {
             "type = \"undesired_contacts\"\nsensor = \"feet\"\nforce = 1",
             &["rewards.alive", "sensor", "feet"],
         ),
+        (LIMITS, "type = \"root_height_below_minimum\"\nheight = nan", &["terminations.limits", "height is NaN"]),
+        (LIMITS, "type = \"bad_orientation\"\nangle = inf", &["terminations.limits", "angle is inf"]),
         (START, &*mass("bodies = [\"cart/crat\"]", "scale = [1, 2]"), &["events.start", "bodies", "crat", "cart/cart"]),
         (START, &*mass("bodies = [\"cart/cart\"]", "scale = [2, 1]"), &["events.start", "2 to 1"]),
         (START, &*mass("bodies = [\"cart/cart\"]", "multiply = [1, 2]"), &["events.start", "multiply", "scale"]),
