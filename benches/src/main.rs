@@ -24,6 +24,7 @@ mod sensor_rates;
 mod settings;
 mod startup;
 mod step;
+mod tasks;
 mod trace;
 mod view;
 
@@ -45,6 +46,7 @@ const BENCHES: &[(&str, Bench)] = &[
     ("trace", trace::run),
     ("contacts", contacts::run),
     ("sensors", sensor_rates::run),
+    ("tasks", tasks::run),
     ("ik", ik::run),
     ("randomize", randomize::run),
     ("python", python::run),
@@ -59,8 +61,8 @@ type Bench = fn(&Settings) -> BenchResult<Vec<Row>>;
 #[derive(Debug, Parser)]
 #[command(name = "kinetoscope-benches")]
 struct Args {
-    /// Only these benchmarks: step, drive, mujoco-batch, camera, rays, record, view, trace, contacts, sensors, ik,
-    /// randomize, python, startup, memory, scale
+    /// Only these benchmarks: step, drive, mujoco-batch, camera, rays, record, view, trace, contacts, sensors, tasks,
+    /// ik, randomize, python, startup, memory, scale
     names: Vec<String>,
     /// Also write all rows, as JSON, to this file
     #[arg(long, value_name = "FILE")]

@@ -138,6 +138,7 @@ pub use objects::rigid_object::{RigidObject, RigidObjectMut};
 pub use objects::rigid_object_data::{BodyType, RigidObjectCfg};
 pub use objects::robot::{Robot, RobotCfg, RobotMut};
 pub use objects::robot_data::JointIndex;
+pub use objects::robot_gather::RobotState;
 pub use objects::robot_part::RobotPartMut;
 pub use objects::shape::ObjectShape;
 pub use objects::terrain::{Terrain, TerrainCfg};

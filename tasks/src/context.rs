@@ -2,7 +2,8 @@
 
 use crate::error::{EnvError, Result, TermKind, TermResult};
 use crate::guard::guard;
-use kinetoscope_sim::SimulationManager;
+use crate::robot_cache::RobotCache;
+use kinetoscope_sim::{RobotId, RobotState, SimulationManager};
 use ndarray::{Array1, Array2, ArrayView1, ArrayView2};
 
 /// Read access to the simulation and the task state of all environments, for the functions of terms.
@@ -14,7 +15,11 @@ pub struct TermContext<'e> {
 /// The simulation and the state of a task outside it.
 #[derive(Debug)]
 pub(crate) struct TaskState {
-    pub(crate) sim: SimulationManager,
+    /// Changed through [`sim_mut`](Self::sim_mut) only, which clears `robots`.
+    sim: SimulationManager,
+    robots: RobotCache,
+    /// Physics steps of a task step.
+    decimation: u32,
     /// Actions of the step in progress or of the last step, within their bounds, shape (N, action columns).
     pub(crate) actions: Array2<f64>,
     /// Actions of the step before that of `actions`, shape (N, action columns).
@@ -38,6 +43,47 @@ pub(crate) struct CommandState {
 }
 
 impl TaskState {
+    /// Creates the state before the first reset, without commands and curricula.
+    pub(crate) fn new(sim: SimulationManager, decimation: u32, action_columns: usize) -> Self {
+        let n = sim.num_envs();
+        Self {
+            sim,
+            decimation,
+            robots: RobotCache::default(),
+            actions: Array2::zeros((n, action_columns)),
+            previous_actions: Array2::zeros((n, action_columns)),
+            episode_steps: vec![0; n],
+            commands: Vec::new(),
+            curricula: Vec::new(),
+        }
+    }
+
+    /// Duration of a task step \[s\].
+    pub(crate) fn step_dt(&self) -> f64 {
+        f64::from(self.decimation) * self.sim.cfg().physics_dt
+    }
+
+    /// Read access to the simulation.
+    pub(crate) fn sim(&self) -> &SimulationManager {
+        &self.sim
+    }
+
+    /// The simulation, to change it.
+    pub(crate) fn sim_mut(&mut self) -> &mut SimulationManager {
+        self.robots.clear();
+        &mut self.sim
+    }
+
+    /// The simulation, to change it, and the actions.
+    pub(crate) fn sim_and_actions(&mut self) -> (&mut SimulationManager, ArrayView2<'_, f64>) {
+        self.robots.clear();
+        (&mut self.sim, self.actions.view())
+    }
+
+    pub(crate) fn into_sim(self) -> SimulationManager {
+        self.sim
+    }
+
     pub(crate) fn context(&self) -> TermContext<'_> {
         TermContext { state: self }
     }
@@ -69,7 +115,15 @@ impl EventContext<'_> {
 
     /// The simulation, to change it in the environments of the event.
     pub fn sim_mut(&mut self) -> &mut SimulationManager {
-        &mut self.state.sim
+        self.state.sim_mut()
+    }
+
+    /// Present state of a robot in all environments; see [`TermContext::robot`].
+    ///
+    /// # Panics
+    /// The robot belongs to another manager.
+    pub fn robot(&self, robot: RobotId) -> &RobotState {
+        self.state.robots.get(&self.state.sim, robot)
     }
 
     /// Values of the command term called `name`, shape (N, columns of the term). A reset event gets the new numbers of
@@ -96,9 +150,24 @@ impl<'e> TermContext<'e> {
         &self.state.sim
     }
 
+    /// State of a robot in all environments. It is gathered when the first term reads it, and shared by all terms until
+    /// the simulation changes: prefer it to the methods of [`Robot`](kinetoscope_sim::Robot), which gather at every
+    /// call.
+    ///
+    /// # Panics
+    /// The robot belongs to another manager.
+    pub fn robot(&self, robot: RobotId) -> &'e RobotState {
+        self.state.robots.get(&self.state.sim, robot)
+    }
+
     /// Number of environments.
     pub fn num_envs(&self) -> usize {
         self.state.sim.num_envs()
+    }
+
+    /// Duration of a task step \[s\].
+    pub fn step_dt(&self) -> f64 {
+        self.state.step_dt()
     }
 
     /// Actions of the step in progress, or of the last step between steps, clamped to their bounds, shape (N, columns

@@ -79,7 +79,7 @@ impl Env {
     /// Read access to the simulation in its current state: after the last step, including the resets of episodes that
     /// ended in it.
     pub fn sim(&self) -> &SimulationManager {
-        &self.state.sim
+        self.state.sim()
     }
 
     /// The simulation, to serve, record or change it between steps.
@@ -88,13 +88,13 @@ impl Env {
     /// step ends the episode ([`EndReason::Reset`](crate::EndReason::Reset)), and a new one begins as
     /// [`EnvCfg::autoreset`] says. To begin a new episode at once, call [`reset`](Self::reset).
     pub fn sim_mut(&mut self) -> &mut SimulationManager {
-        &mut self.state.sim
+        self.state.sim_mut()
     }
 
     /// Returns the simulation in its current state: after the last step, including the resets of episodes that ended in
     /// it.
     pub fn into_sim(self) -> SimulationManager {
-        let (mut sim, (_, id)) = (self.state.sim, self.reset_monitor);
+        let (mut sim, (_, id)) = (self.state.into_sim(), self.reset_monitor);
         // The caller may have swapped the simulation through `sim_mut`. Then it lacks this observer.
         if sim.observers().contains(id) {
             let _ = sim.observers_mut().remove(id);
@@ -119,7 +119,7 @@ impl Env {
 
     /// Duration of a task step \[s\]: `decimation` times the physics time step.
     pub fn step_dt(&self) -> f64 {
-        f64::from(self.cfg.decimation) * self.state.sim.cfg().physics_dt
+        self.state.step_dt()
     }
 
     /// Columns of the observations in the group [`POLICY_GROUP`](crate::POLICY_GROUP), named `term/column`, with the
@@ -203,22 +203,22 @@ impl Env {
                 next_event_steps: vec![0; terms.events.len()],
             }
         };
-        let actions = Array2::zeros((n, action_space.len()));
         let command = |term: &CommandTerm| CommandState {
             name: term.name.clone(),
             drawn: Array2::zeros((n, term.drawn)),
             values: Array2::zeros((n, term.columns.len())),
         };
-        let commands = terms.commands.iter().map(command).collect();
-        let curricula = terms.curricula.iter().map(|term| (term.name.clone(), Array1::zeros(n))).collect();
-        let previous_actions = actions.clone();
         let watch = ResetMonitor::new(n);
+        let reset_monitor = (watch.clone(), sim.observers_mut().add(watch));
+        let mut state = TaskState::new(sim, cfg.decimation, action_space.len());
+        state.commands = terms.commands.iter().map(command).collect();
+        state.curricula = terms.curricula.iter().map(|term| (term.name.clone(), Array1::zeros(n))).collect();
         let mut env = Self {
-            reset_monitor: (watch.clone(), sim.observers_mut().add(watch)),
+            reset_monitor,
             episodes: (0..n).map(row).collect(),
             reward_sums: Array2::zeros((n, terms.rewards.len())),
             buffers: terms.groups.iter().map(|group| GroupBuffers::new(group, n)).collect(),
-            state: TaskState { sim, actions, previous_actions, episode_steps: vec![0; n], commands, curricula },
+            state,
             cfg,
             terms,
             action_space,

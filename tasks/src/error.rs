@@ -1,5 +1,6 @@
 //! Errors of tasks and their terms.
 
+use kinetoscope_scene::pattern::PatternError;
 use std::fmt;
 
 /// Result of this crate.
@@ -165,6 +166,15 @@ pub enum EnvError {
         /// Names that exist, the nearest first; at most 12.
         candidates: Vec<String>,
     },
+    /// A pattern of names is invalid or matches nothing, or two patterns match one name.
+    #[error("{field}: {error}")]
+    Pattern {
+        /// The field of a term.
+        field: String,
+        /// The mistake, with candidates.
+        #[source]
+        error: Box<PatternError>,
+    },
     /// An array has the wrong shape.
     #[error("{what} has shape {found:?}; expected {expected:?} ({meaning})")]
     Shape {
@@ -213,6 +223,11 @@ impl EnvError {
     /// Creates [`Term`](Self::Term).
     pub(crate) fn term(kind: TermKind, name: &str, error: TermError) -> Self {
         Self::Term { kind, name: name.into(), error }
+    }
+
+    /// Creates [`Pattern`](Self::Pattern) for the field of a term.
+    pub(crate) fn pattern(kind: TermKind, name: &str, field: &str, error: PatternError) -> Self {
+        Self::Pattern { field: format!("{field} of the {kind} term {name:?}"), error: Box::new(error) }
     }
 
     /// Creates [`UnknownName`](Self::UnknownName) with the candidates nearest to `name`.

@@ -89,6 +89,7 @@ mod observation;
 mod registry;
 mod reset_monitor;
 mod reward;
+mod robot_cache;
 mod space;
 mod step;
 mod stepping;

@@ -79,7 +79,7 @@ impl Env {
         let rewards = reward_terms.map_axis(Axis(1), |terms| terms.iter().fold(0.0, |sum, reward| sum + reward));
         let result =
             StepResult { rewards: rewards.clone(), terminated: terminated.clone(), truncated: truncated.clone() };
-        result.publish(&mut self.state.sim)?;
+        result.publish(self.state.sim_mut())?;
         let is_running = |env: &usize| self.episodes[*env].phase == Phase::Running && reasons[*env].is_none();
         let going_on: Vec<usize> = (0..n).filter(is_running).collect();
         self.run_interval_events(&going_on)?;
@@ -124,8 +124,8 @@ impl Env {
             for term in &self.terms.actions {
                 let end = first + term.space.len();
                 if !again || term.every_physics_step {
-                    let columns = present.actions.slice_axis(Axis(1), Slice::from(first..end));
-                    term.apply(&mut present.sim, columns)?;
+                    let (sim, actions) = present.sim_and_actions();
+                    term.apply(sim, actions.slice_axis(Axis(1), Slice::from(first..end)))?;
                 }
                 first = end;
             }
@@ -134,13 +134,13 @@ impl Env {
         let present = &mut self.state;
         apply(present, false)?;
         if self.terms.actions.iter().any(|term| term.every_physics_step) {
-            present.sim.update(1);
+            present.sim_mut().update(1);
             for _ in 1..self.cfg.decimation {
                 apply(present, true)?;
-                present.sim.update(1);
+                present.sim_mut().update(1);
             }
         } else {
-            present.sim.update(self.cfg.decimation);
+            present.sim_mut().update(self.cfg.decimation);
         }
         Ok(())
     }
@@ -152,7 +152,7 @@ impl Env {
         let n = self.num_envs();
         let (mut terminated, mut truncated) = (Array1::from_elem(n, false), Array1::from_elem(n, false));
         let mut reasons: Vec<Option<EndReason>> = vec![None; n];
-        for diverged in self.state.sim.diverged() {
+        for diverged in self.state.sim().diverged() {
             terminated[diverged.env.0] = true;
             reasons[diverged.env.0] = Some(EndReason::Diverged(diverged.to_string()));
         }
@@ -206,7 +206,7 @@ impl Env {
             return Ok(());
         }
         let ids: Vec<EnvId> = envs.iter().map(|&env| EnvId(env)).collect();
-        self.state.sim.reset(Some(&ids))?;
+        self.state.sim_mut().reset(Some(&ids))?;
         for &env in envs {
             let row = &mut self.episodes[env];
             row.key.episode = row.next_episode;
@@ -242,8 +242,7 @@ impl Env {
             command.values.row_mut(env).iter_mut().zip(&drawn).for_each(|(to, from)| *to = *from);
         }
         let mut time = row.key.episode_rng(env, &format!("command time/{name}/{now}"));
-        let step_dt = f64::from(self.cfg.decimation) * self.state.sim.cfg().physics_dt;
-        row.next_command_steps[k] = now.saturating_add(term.steps_to_next_draw(&mut time, step_dt));
+        row.next_command_steps[k] = now.saturating_add(term.steps_to_next_draw(&mut time, self.state.step_dt()));
         Ok(())
     }
 

@@ -126,7 +126,8 @@ impl TerrainGrid {
         [at(row, self.rows, self.tile_size[0]), at(column, self.columns, self.tile_size[1])]
     }
 
-    /// Highest point of the platform of each tile \[m\], shape (rows, columns).
+    /// Highest point of the platform of each tile \[m\], shape (rows, columns). The points of a platform include those
+    /// nearest to the center of the tile, also for a platform smaller than a cell.
     ///
     /// # Errors
     /// Those of [`heights`](Self::heights).
@@ -135,10 +136,13 @@ impl TerrainGrid {
         let half = 0.5 * self.platform.min(self.tile_size[0]).min(self.tile_size[1]);
         Ok(Array2::from_shape_fn((self.rows, self.columns), |(row, column)| {
             let center = self.tile_center(row, column);
-            // First and last point within half a platform of the center.
+            // First and last point within half a platform of the center. The points on both sides of the center belong to
+            // every platform.
             let [(x, last_x), (y, last_y)] = [0, 1].map(|axis| {
                 let at = |distance: f64| (center[axis] + 0.5 * size[axis] + distance) / self.cell;
-                ((at(-half) - 1e-6).ceil() as usize, (at(half) + 1e-6).floor() as usize)
+                let (below, above) = ((at(0.0) + 1e-6).floor(), (at(0.0) - 1e-6).ceil());
+                let (first, last) = ((at(-half) - 1e-6).ceil().min(below), (at(half) + 1e-6).floor().max(above));
+                (first as usize, last as usize)
             });
             let points = (y..=last_y).flat_map(|r| (x..=last_x).map(move |c| (r, c)));
             points.map(|point| heights[point]).fold(f64::NEG_INFINITY, f64::max)

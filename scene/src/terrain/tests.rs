@@ -1,6 +1,7 @@
 //! Tests of the generators' heights.
 
 use super::*;
+use ndarray::Array2;
 
 #[test]
 fn rough() {
@@ -56,7 +57,7 @@ fn stairs() {
 }
 
 /// Checks that an error has a message with `says`.
-fn refused(result: Result<ndarray::Array2<f64>, TerrainError>, says: &str) {
+fn refused(result: Result<Array2<f64>, TerrainError>, says: &str) {
     let message = result.expect_err(says).to_string();
     assert!(message.contains(says), "{message} lacks {says}");
 }
@@ -178,6 +179,102 @@ fn obstacles() {
     assert!(none.iter().all(|height| *height == 0.0));
 }
 
+/// Root cause of the failure: every obstacle filled all of its points, so that many large obstacles took the product of
+/// their number and their area. In a small field, heights are compared with those of obstacles that fill their points
+/// one by one.
+#[test]
+fn many_obstacles() {
+    let small =
+        DiscreteObstacles { size: [3.0, 2.0], count: 600, sides: [0.1, 0.9], platform: 0.5, ..Default::default() };
+    let heights = small.heights().expect("heights");
+    let mut random = crate::KeyedRng::keyed(small.seed, 0, "discrete obstacles");
+    let mut expected = Array2::<f64>::zeros((21, 31));
+    for _ in 0..small.count {
+        let height = random.uniform_range(0.05, 0.2);
+        let mut place = |cells: usize| {
+            let side = ((random.uniform_range(0.1, 0.9) / 0.1).round() as usize).clamp(1, cells);
+            let first = ((random.uniform() * (cells - side + 1) as f64) as usize).min(cells - side);
+            first..first + side + 1
+        };
+        let (columns, rows) = (place(30), place(20));
+        rows.for_each(|r| columns.clone().for_each(|c| expected[(r, c)] = height));
+    }
+    let on_platform = |r: usize, c: usize| (8..=12).contains(&r) && (13..=17).contains(&c);
+    expected.indexed_iter_mut().filter(|((r, c), _)| on_platform(*r, *c)).for_each(|(_, height)| *height = 0.0);
+    assert_eq!(heights, expected);
+
+    // The largest count in a large field: point by point, these are 2.5e10 assignments.
+    let large = DiscreteObstacles {
+        size: [100.0, 100.0],
+        count: 100_000,
+        sides: [49.0, 50.0],
+        platform: 1.0,
+        ..Default::default()
+    };
+    let start = std::time::Instant::now();
+    large.heights().expect("heights");
+    assert!(start.elapsed().as_secs() < 60, "{:?}", start.elapsed());
+}
+
+/// Root cause of the failure: with an odd number of cells along a tile, its center lies between the points, and a
+/// platform smaller than a cell contains no point. The maximum over no points was -inf.
+#[test]
+fn platforms_between_points() {
+    for (cells, platform) in [(5.0, 0.05), (5.0, 0.3), (6.0, 0.05)] {
+        let tiles = vec![TerrainTile::SlopeUp(SlopeTile { gradient: [0.5, 0.5] }).into()];
+        let tile_size = [0.1 * cells; 2];
+        let grid = TerrainGrid { rows: 2, columns: 1, tile_size, tiles, platform, border: 0.3, ..Default::default() };
+        // The points nearest to the center are `half` a cell or 0 from it.
+        let half = if cells == 5.0 { 0.05 } else { 0.0 };
+        let expected = 0.5 * (0.05 * cells - half).min(0.5 * (0.1 * cells - platform));
+        let tops = grid.platform_heights().expect("heights");
+        assert!(tops.iter().all(|top| (top - expected).abs() < 1e-12), "{cells} {platform}: {tops}, not {expected}");
+    }
+}
+
+/// Heights of every type of tile, halfway between the easiest and the hardest, by closed forms: of the distance from the
+/// rim \[cells\], or as a set of values for random types.
+#[test]
+fn tiles() {
+    let cfg = TileCfg { size: [8.0, 8.0], cell: 0.1, platform: 2.0, seed: 7 };
+    // The platform begins 3 m from the rim. Stairs have treads of three cells, of which ten fit.
+    let by_rim = |name: &str, d: f64| match name {
+        "flat" => Some(0.0),
+        "slope_up" => Some(0.2 * 0.1 * d.min(30.0)),
+        "slope_down" => Some(-0.2 * 0.1 * d.min(30.0)),
+        "stairs_up" => Some(0.14 * (d / 3.0).floor().min(10.0)),
+        "stairs_down" => Some(-0.14 * (d / 3.0).floor().min(10.0)),
+        // A trench of 0.5 m, with a wall of one cell on each side.
+        "gap" => Some(if 25.0 < d && d < 30.0 { -1.0 } else { 0.0 }),
+        _ => None,
+    };
+    for tile in TerrainTile::all() {
+        let (name, heights) = (tile.name(), tile.heights(0.5, cfg).expect("heights"));
+        assert_eq!(heights.dim(), (81, 81), "{name}");
+        let mut distinct = std::collections::BTreeSet::new();
+        for ((r, c), &height) in heights.indexed_iter() {
+            distinct.insert(height.to_bits());
+            let wave = |k: usize| (std::f64::consts::TAU * 4.0 * k as f64 / 80.0).sin();
+            let exact = if name == "waves" {
+                Some(0.5 * 0.11 * (wave(r) + wave(c)))
+            } else {
+                by_rim(name, r.min(80 - r).min(c).min(80 - c) as f64)
+            };
+            let is_platform = (30..=50).contains(&r) && (30..=50).contains(&c);
+            let valid = match name {
+                _ if exact.is_some_and(|exact| (height - exact).abs() > 1e-12) => false,
+                "rough" => (height / 0.01 - (height / 0.01).round()).abs() < 1e-9 && height.abs() < 0.06 + 1e-12,
+                "boxes" => height.abs() <= 0.125 + 1e-12 && (height == 0.0 || !is_platform),
+                "stepping_stones" => height == 0.0 || height == -1.0 && !is_platform,
+                "discrete_obstacles" => height == 0.0 || (height - 0.125).abs() < 1e-12 && !is_platform,
+                _ => exact.is_some(),
+            };
+            assert!(valid, "{name}, row {r}, column {c}: {height}, not {exact:?}");
+        }
+        assert!(distinct.len() > 1 || name == "flat", "{name} is flat");
+    }
+}
+
 /// Each tile of a grid is the terrain of its type and difficulty; the rims and the border are at height 0.
 #[test]
 fn grid() {
@@ -236,6 +333,8 @@ fn new_refusals() {
     refused(SteppingStones { stone: f64::NAN, ..SteppingStones::default() }.heights(), "stone is NaN");
     refused(DiscreteObstacles { sides: [0.5, 9.0], ..Default::default() }.heights(), "must fit into the field");
     refused(DiscreteObstacles { count: u32::MAX, ..Default::default() }.heights(), "at most 100000");
+    let tiny = DiscreteObstacles { size: [2.0, 2.0], count: 442, ..Default::default() };
+    refused(tiny.heights(), "at most one for each point");
     let grid = TerrainGrid::default;
     refused(TerrainGrid { rows: 0, ..grid() }.heights(), "rows is 0");
     refused(TerrainGrid { tiles: Vec::new(), ..grid() }.heights(), "name at least one");

@@ -85,6 +85,24 @@ impl Batch {
         });
     }
 
+    /// Calls `read` for every environment, in parallel and in any order, with its row and with the elements of `out`
+    /// that belong to the environment: an equal number for each.
+    pub(crate) fn read_stored<T: Send>(&self, out: &mut [T], read: impl Fn(&StoredRow<'_>, &mut [T]) + Sync) {
+        let (width, model) = (out.len() / self.num_envs, &self.model);
+        let copy = |chunk: &Chunk, out: &mut [T]| {
+            for (k, row) in chunk.rows.iter().enumerate() {
+                read(&StoredRow { row, model }, &mut out[k * width..(k + 1) * width]);
+            }
+        };
+        if out.len() <= FEW_ELEMENTS {
+            for (chunk, out) in self.chunks.chunks.iter().zip(self.parts(out)) {
+                copy(&lock(chunk), out);
+            }
+            return;
+        }
+        self.in_chunks(out, |_, taken, out| copy(&taken.chunk, out));
+    }
+
     /// Parts of `out` that belong to the chunks.
     fn parts<'o, T>(&self, out: &'o mut [T]) -> Vec<&'o mut [T]> {
         let (count, size) = (self.chunks.chunks.len(), self.chunks.chunk_size * (out.len() / self.num_envs));

@@ -31,18 +31,21 @@ impl FreeBody<'_> {
     /// Velocities of the frame, then angular velocities, in world axes, shape (N, 6); 0 for a body without a free
     /// joint.
     pub(super) fn velocities(&self) -> Array2<f64> {
-        self.rows(|bodies| {
-            let Some((_, dof)) = self.index.free_joint else { return [0.0; 6] };
-            let v = &bodies.qvel()[dof..dof + 6];
-            // MuJoCo stores the angular velocity of a free joint in the axes of the body.
-            let angular = body_pose(bodies, self.index.body).rotation * Vector3::new(v[3], v[4], v[5]);
-            [v[0], v[1], v[2], angular.x, angular.y, angular.z]
-        })
+        self.rows(|bodies| world_velocity(bodies, self.index))
     }
 
     fn rows<const K: usize>(&self, read: impl Fn(&StoredBodies<'_>) -> [f64; K] + Sync) -> Array2<f64> {
         self.simulation.batch.body_rows(read)
     }
+}
+
+/// Velocity of the frame of a body, then its angular velocity, in world axes; 0 for a body without a free joint.
+pub(super) fn world_velocity(bodies: &StoredBodies<'_>, index: BodyIndexing) -> [f64; 6] {
+    let Some((_, dof)) = index.free_joint else { return [0.0; 6] };
+    let v = &bodies.qvel()[dof..dof + 6];
+    // MuJoCo stores the angular velocity of a free joint in the axes of the body.
+    let angular = body_pose(bodies, index.body).rotation * Vector3::new(v[3], v[4], v[5]);
+    [v[0], v[1], v[2], angular.x, angular.y, angular.z]
 }
 
 /// Storage of the pose of a body that can be placed.

@@ -23,6 +23,7 @@ mod robot_clearance;
 pub(crate) mod robot_data;
 mod robot_drives;
 mod robot_full_state;
+pub(crate) mod robot_gather;
 mod robot_limits;
 pub(crate) mod robot_part;
 mod robot_passive_joints;

@@ -10,6 +10,7 @@ use crate::objects::robot::{Robot, RobotMut};
 use crate::objects::robot_data::JointIndex;
 use crate::objects::rows::NumberKind;
 use crate::pattern::{self, PatternError};
+use crate::row::StoredRow;
 use kinetoscope_robot::description::LinkId;
 use kinetoscope_scene::Pose;
 use kinetoscope_scene::pose::to_row;
@@ -177,19 +178,13 @@ impl Robot<'_> {
     /// 0 without gravity.
     #[doc(alias = "get_projected_gravity_b")]
     pub fn projected_gravity_b(&self) -> Array2<f64> {
-        self.in_root_axes(|bodies, _, _| {
-            let gravity = Vector3::from(bodies.gravity());
-            gravity.try_normalize(0.0).unwrap_or_else(Vector3::zeros)
-        })
+        self.in_root_axes(|bodies, _, _| direction_of_gravity(bodies))
     }
 
     /// Heading of the root link \[rad\], shape (N,): the angle about the world's z of its x axis, from -π to π.
     #[doc(alias = "get_root_heading")]
     pub fn root_heading(&self) -> Array1<f64> {
-        let headings = self.rows(|bodies, robot| {
-            let forward = body_pose(bodies, robot.root.body).rotation * Vector3::x();
-            [forward.y.atan2(forward.x)]
-        });
+        let headings = self.rows(|bodies, robot| [heading(&body_pose(bodies, robot.root.body))]);
         headings.index_axis(Axis(1), 0).to_owned()
     }
 
@@ -243,6 +238,17 @@ impl Robot<'_> {
 fn link_velocity(bodies: &StoredBodies<'_>, link: &BodyFrame) -> [f64; 6] {
     let [v, w] = body_velocity(bodies, link.body, &link.pose(bodies).translation.vector);
     [v.x, v.y, v.z, w.x, w.y, w.z]
+}
+
+/// Direction of gravity in world axes, a unit vector; 0 without gravity.
+pub(super) fn direction_of_gravity(row: &StoredRow<'_>) -> Vector3<f64> {
+    Vector3::from(row.gravity()).try_normalize(0.0).unwrap_or_else(Vector3::zeros)
+}
+
+/// Angle about the world's z of the x axis of a frame \[rad\].
+pub(super) fn heading(frame: &Pose) -> f64 {
+    let forward = frame.rotation * Vector3::x();
+    forward.y.atan2(forward.x)
 }
 
 fn root_center_of_mass(bodies: &StoredBodies<'_>, robot: &RobotIndexing) -> Vector3<f64> {

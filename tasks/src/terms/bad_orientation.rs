@@ -7,7 +7,7 @@ use kinetoscope_sim::RobotId;
 /// world's z axis by more than `angle` \[rad\].
 pub fn bad_orientation(name: &str, robot: RobotId, angle: f64) -> TerminationTerm {
     TerminationTerm::new(name, move |now| {
-        let poses = now.sim().robot(robot).root_pose();
+        let poses = now.robot(robot).root_pose();
         // With a quaternion (w, x, y, z), this element of the rotation matrix is the cosine of the angle between the z
         // axes.
         let cosine = |[x, y]: [f64; 2]| (1.0 - 2.0 * (x * x + y * y)).clamp(-1.0, 1.0);

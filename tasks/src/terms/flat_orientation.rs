@@ -7,7 +7,7 @@ use kinetoscope_sim::RobotId;
 /// for one on its side. It is also 0 upside down and without gravity. A penalty needs a negative `weight`.
 pub fn flat_orientation(name: &str, weight: f64, robot: RobotId) -> RewardTerm {
     RewardTerm::new(name, weight, move |now| {
-        let gravity = now.sim().robot(robot).projected_gravity_b();
+        let gravity = now.robot(robot).projected_gravity_b();
         Ok(gravity.rows().into_iter().map(|down| down[0] * down[0] + down[1] * down[1]).collect())
     })
 }

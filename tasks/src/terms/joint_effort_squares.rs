@@ -1,10 +1,9 @@
 //! Reward of joint efforts.
 
-use super::{find_joints, select_joints};
+use super::{find_joints, sum_over_joints};
 use crate::error::Result;
 use crate::reward::RewardTerm;
 use kinetoscope_sim::{RobotId, SimulationManager};
-use ndarray::Axis;
 
 /// Sum of the squared drive efforts ([`qf`](kinetoscope_sim::Robot::qf)) in the last physics step \[N² m² or N²\], over
 /// the joints that match one of `patterns` (whole names). Joints without a drive add 0. A penalty needs a negative
@@ -24,7 +23,6 @@ pub fn joint_torques_l2(
 ) -> Result<RewardTerm> {
     let (_, joints) = find_joints(sim, robot, patterns)?;
     Ok(RewardTerm::new(name, weight, move |now| {
-        let efforts = select_joints(&now.sim().robot(robot).qf(), &joints);
-        Ok(efforts.map_axis(Axis(1), |row| row.iter().map(|x| x * x).sum()))
+        Ok(sum_over_joints(now.robot(robot).qf(), &joints, |_, effort| effort * effort))
     }))
 }

@@ -23,8 +23,7 @@ pub fn joint_out_of_limits(
 ) -> Result<TerminationTerm> {
     let (_, joints) = find_joints(sim, robot, patterns)?;
     Ok(TerminationTerm::new(name, move |now| {
-        let robot = now.sim().robot(robot);
-        let (positions, limits) = (robot.qpos(), robot.soft_qpos_limits());
+        let (positions, limits) = (now.robot(robot).qpos(), now.sim().robot(robot).soft_qpos_limits());
         let is_out = |env: usize| {
             joints.iter().any(|joint| {
                 let (at, range) = (positions[(env, joint.0)], limits.index_axis(Axis(0), env));

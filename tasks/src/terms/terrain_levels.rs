@@ -60,7 +60,7 @@ pub fn terrain_levels(name: &str, robot: RobotId, grid: &TerrainGrid, cfg: Terra
         name,
         move |rng| draw(rng, highest + 1),
         move |now, rngs, levels| {
-            let poses = now.sim().robot(robot).root_pose();
+            let poses = now.robot(robot).root_pose();
             let commands = cfg.command.as_deref().map(|command| now.command(command)).transpose()?;
             let next = rngs.iter_mut().map(|rng| {
                 let (env, level) = (rng.env().0, levels[rng.env().0]);

@@ -11,7 +11,7 @@ use kinetoscope_sim::RobotId;
 pub fn track_lin_vel(name: &str, weight: f64, robot: RobotId, command: impl Into<String>, std: f64) -> RewardTerm {
     let command = command.into();
     RewardTerm::new(name, weight, move |now| {
-        let (moves, wanted) = (now.sim().robot(robot).root_lin_vel_b(), now.command(&command)?);
+        let (moves, wanted) = (now.robot(robot).root_lin_vel_b(), now.command(&command)?);
         if wanted.ncols() < 2 {
             let found = wanted.ncols();
             return Err(format!("the command {command:?} has {found} columns; it needs at least two, x and y").into());

@@ -93,7 +93,7 @@ pub fn uniform_velocity(name: &str, robot: RobotId, cfg: UniformVelocityCfg) -> 
     };
     let columns = ["lin_vel_x", "lin_vel_y", "ang_vel_z"];
     let term = CommandTerm::derived(name, columns, sample, move |now, drawn| {
-        let headings = cfg.heading.map(|_| now.sim().robot(robot).root_heading());
+        let headings = cfg.heading.map(|_| now.robot(robot).root_heading());
         Ok(Array2::from_shape_fn((drawn.nrows(), 3), |(env, k)| {
             let row = drawn.row(env);
             match &headings {

@@ -9,6 +9,8 @@ use super::ENVS;
 use kinetoscope::mujoco::ObjectKind;
 use kinetoscope::ndarray::{Array2, Axis, array};
 use kinetoscope::prelude::*;
+use kinetoscope::sim::RobotState;
+use kinetoscope_testkit::bits::bits;
 use kinetoscope_testkit::error_tables::assert_error;
 use kinetoscope_testkit::tolerance::{Tolerance, assert_close, assert_number};
 use kinetoscope_testkit::urdf::{TempFiles, joint, link, robot};
@@ -406,4 +408,53 @@ fn parts() {
     let targets = [robot.qpos_target(), robot.qvel_target(), robot.qf_target()];
     assert_eq!(targets, [positions, velocities, efforts]);
     assert_error(sim.robot_mut(arm).into_part("wrst").map(drop), "", &["wrst", "wrist"]);
+}
+
+/// The state that is gathered at once is that of the single methods, with a free and a fixed base, and has the same bits
+/// for any number of threads. Its memory serves several robots and states.
+#[test]
+fn gathered() {
+    let mut state = RobotState::default();
+    assert!(state.root_pose().is_empty() && state.qpos().is_empty());
+    let mut run = |num_envs: usize, threads: usize| {
+        let cfg = SimulationManagerCfg { num_envs, threads: Some(threads), ..SimulationManagerCfg::legged() };
+        let mut sim = kinetoscope_testkit::worlds::sim(cfg);
+        let free = sim.add_robot(assets::quadruped().unwrap()).unwrap();
+        let arm = RobotCfg { init_pose: Pose::translation(2.0, 0.0, 0.0), ..assets::sr5().unwrap() };
+        let fixed = sim.add_robot(arm).unwrap();
+        let start = |env: usize| [0.1, 0.2, 0.5 + 1e-3 * env as f64, 0.8, 0.6, 0.0, 0.0];
+        let starts = Array2::from_shape_fn((num_envs, 7), |(env, k)| start(env)[k]);
+        sim.robot_mut(free).write_root_pose(&starts, None).unwrap();
+        let mut all = Vec::new();
+        for steps in [0, 1, 40] {
+            sim.update(steps);
+            for robot in [free, fixed].map(|id| sim.robot(id)) {
+                robot.gather_state(&mut state);
+                for (what, found, expected) in [
+                    ("root_pose", state.root_pose(), robot.root_pose()),
+                    ("root_velocity", state.root_velocity(), robot.root_velocity()),
+                    ("root_lin_vel_b", state.root_lin_vel_b(), robot.root_lin_vel_b()),
+                    ("root_ang_vel_b", state.root_ang_vel_b(), robot.root_ang_vel_b()),
+                    ("projected_gravity_b", state.projected_gravity_b(), robot.projected_gravity_b()),
+                    ("heading", state.root_heading().insert_axis(Axis(1)), robot.root_heading().insert_axis(Axis(1))),
+                ] {
+                    assert_close(what, found, &expected, EXACT);
+                    all.extend(bits(found));
+                }
+                for (what, found, expected) in [
+                    ("qpos", state.qpos(), robot.qpos()),
+                    ("qvel", state.qvel(), robot.qvel()),
+                    ("qacc", state.qacc(), robot.qacc()),
+                    ("qf", state.qf(), robot.qf()),
+                ] {
+                    assert!(found == expected, "{what} of {}: {found}, not {expected}", robot.uid());
+                    assert!(steps == 0 || found.iter().any(|value| *value != 0.0), "{what} is 0");
+                }
+            }
+        }
+        all
+    };
+    for num_envs in [3, 700] {
+        assert!(run(num_envs, 1) == run(num_envs, 3), "{num_envs} environments");
+    }
 }

@@ -99,6 +99,21 @@ fn command(columns: &str) -> String {
     format!("[commands.goal]\ntype = \"uniform_command\"\n[commands.goal.columns]\n{columns}\n[rewards.alive]")
 }
 
+const EFFORTS: &str = "type = \"joint_efforts\"\nrobot = \"cart\"\njoints = [\"slide\"]\nbound = 10";
+const LIMITS: &str = "type = \"joint_out_of_limits\"";
+const START: &str = "type = \"reset_joints_by_offset\"\npositions = [-0.1, 0.1]";
+const ALIVE: &str = "[rewards.alive]\ntype = \"is_alive\"";
+
+/// A reward for tracking a command with columns.
+fn tracking(of_type: &str, columns: &str, std: &str) -> String {
+    command(columns) + &format!("\ntype = \"{of_type}\"\ncommand = \"goal\"\nstd = {std}")
+}
+
+/// An event that randomizes masses.
+fn mass(keys: &str, op: &str) -> String {
+    format!("type = \"randomize_mass\"\n{keys}\nop = {{ {op} }}")
+}
+
 /// Each row replaces a part of the text and names the words of the error.
 #[test]
 fn mistakes() {
@@ -159,6 +174,44 @@ fn mistakes() {
         ("[rewards.alive]", &*command("x = 2"), &["commands.goal", "columns.x"]),
         ("[rewards.alive]", &*command(""), &["commands.goal", "at least one column"]),
         ("[rewards.alive]", &*command("x = [1, 2]\ny = [1, 2, 3]"), &["commands.goal", "columns.y"]),
+        (EFFORTS, "type = \"joint_positions\"\nscale = { slidr = 2 }", &["actions.push", "scale", "slidr", "slide"]),
+        (EFFORTS, "type = \"joint_positions\"\nscale = nan", &["actions.push", "scale", "NaN", "finite"]),
+        (EFFORTS, "type = \"joint_positions\"\nclip = [1, -1]", &["actions.push", "bounds of column", "slide"]),
+        (EFFORTS, "type = \"relative_joint_positions\"\nstep = nan", &["actions.push", "step", "NaN"]),
+        (ALIVE, &*tracking("track_lin_vel", "x = [0, 1]", "1"), &["rewards.alive", "1 columns", "at least 2"]),
+        (ALIVE, &*tracking("track_ang_vel", "x = [0, 1]\ny = [0, 1]", "1"), &["rewards.alive", "at least 3"]),
+        (ALIVE, &*tracking("track_lin_vel", "x = [0, 1]\ny = [0, 1]", "0"), &["rewards.alive", "std is 0"]),
+        (
+            "type = \"is_alive\"",
+            "type = \"feet_air_time\"\nsensor = \"feet\"\ncommand = \"goal\"\nthreshold = 0.5",
+            &["rewards.alive", "command", "goal"],
+        ),
+        (
+            "type = \"is_alive\"",
+            "type = \"undesired_contacts\"\nsensor = \"feet\"\nforce = 1",
+            &["rewards.alive", "sensor", "feet"],
+        ),
+        (LIMITS, "type = \"root_height_below_minimum\"\nheight = nan", &["terminations.limits", "height is NaN"]),
+        (LIMITS, "type = \"bad_orientation\"\nangle = inf", &["terminations.limits", "angle is inf"]),
+        (START, &*mass("bodies = [\"cart/crat\"]", "scale = [1, 2]"), &["events.start", "bodies", "crat", "cart/cart"]),
+        (START, &*mass("bodies = [\"cart/cart\"]", "scale = [2, 1]"), &["events.start", "2 to 1"]),
+        (START, &*mass("bodies = [\"cart/cart\"]", "multiply = [1, 2]"), &["events.start", "multiply", "scale"]),
+        (
+            START,
+            &*mass("bodies = [\"cart/cart\"]\nmode = \"start\"", "scale = [1, 2]"),
+            &["events.start", "start", "startup"],
+        ),
+        (
+            START,
+            &*mass("bodies = [\"cart/cart\"]\nmode = { interval = [0, 3] }", "scale = [1, 2]"),
+            &["the interval of the event term", "0 to 3"],
+        ),
+        (
+            START,
+            "type = \"push_by_setting_velocity\"\nmode = \"reset\"\nlinear = [[1, 0], [0, 0], [0, 0]]",
+            &["events.start", "linear", "1 to 0"],
+        ),
+        (START, "type = \"push_by_setting_velocity\"", &["events.start", "missing field", "mode"]),
     ] {
         assert!(TASK.contains(from), "{from}");
         let error = of_text(&TASK.replacen(from, to, 1)).map(drop).expect_err(to).to_string();

@@ -442,7 +442,7 @@ class DiscreteObstaclesTerrain:
     """Distance of neighboring points [m]."""
 
     count: int = 40
-    """Number of obstacles."""
+    """Number of obstacles, at most one for each point, and at most 100,000."""
 
     sides: Sequence[float] = (0.3, 1.0)
     """Shortest and longest side of an obstacle [m], uniformly distributed."""
