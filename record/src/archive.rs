@@ -137,18 +137,19 @@ impl<'s> ArchiveReader<'s> {
         self.0.file_names_raw().filter_map(|name| std::str::from_utf8(name).ok())
     }
 
-    /// The first `count` bytes of a stored file, without a check; `None` if there is no such file, or it is deflated.
+    /// The first `count` bytes of a stored file, without a check, and the size of the file \[bytes\]; `None` if there is
+    /// no such file, or it is deflated.
     ///
     /// # Errors
     /// It cannot be read.
-    pub(crate) fn read_prefix(&mut self, name: &str, count: u64) -> io::Result<Option<Vec<u8>>> {
+    pub(crate) fn read_prefix(&mut self, name: &str, count: u64) -> io::Result<Option<(Vec<u8>, u64)>> {
         let Some(file) = self.find(name)? else { return Ok(None) };
         if file.compression() != CompressionMethod::Stored {
             return Ok(None);
         }
-        let mut bytes = Vec::new();
+        let (mut bytes, size) = (Vec::new(), file.size());
         file.take(count).read_to_end(&mut bytes)?;
-        Ok(Some(bytes))
+        Ok(Some((bytes, size)))
     }
 
     /// Reads a file, decompresses it and verifies its checksum; `None` if there is no such file.
@@ -241,7 +242,7 @@ mod tests {
         assert!(all[2].1 == meshes && all[3].1 == b"x" && all[0].1 == b"head and data" && all[1].1.is_empty());
         let mut reader = ArchiveReader::open(Cursor::new(bytes.clone())).unwrap();
         assert!(reader.names().eq(names));
-        assert_eq!(reader.read_prefix("a.npy", 4).unwrap(), Some(b"head".to_vec()));
+        assert_eq!(reader.read_prefix("a.npy", 4).unwrap(), Some((b"head".to_vec(), 13)));
         assert_eq!(reader.read_prefix("meshes/a.obj", 4).unwrap(), None);
         assert_eq!((reader.read("nothing").unwrap(), reader.read("behind").unwrap()), (None, Some(b"x".to_vec())));
         assert_eq!(read_all(&bytes[..bytes.len() - 1]), None);

@@ -49,6 +49,7 @@ mod image_folder;
 mod lerobot;
 #[cfg(feature = "foxglove")]
 mod live;
+mod mcap_records;
 mod mcap_writer;
 mod npz;
 mod overview;

@@ -45,6 +45,22 @@ struct Array {
     numbers: OnceLock<Vec<f64>>,
 }
 
+/// Upper limit of the number of values in a row of an array without rows: more than any sensor has.
+const MAX_EMPTY_ROW: u64 = 1 << 24;
+
+/// True if an array of this shape has `values` values. The values of a row are counted even if the array has no row,
+/// because readers name each of them.
+fn fits(shape: &[usize], values: u64) -> bool {
+    let product =
+        |axes: &mut dyn Iterator<Item = usize>| axes.try_fold(1, |all: u64, axis| all.checked_mul(axis as u64));
+    let filled = product(&mut shape.iter().copied().filter(|length| *length > 0));
+    product(&mut shape.iter().copied()) == Some(values) && filled.is_some_and(|all| all <= values.max(MAX_EMPTY_ROW))
+}
+
+fn wrong_count(name: &str) -> String {
+    format!("the number of values of {name} does not match its shape")
+}
+
 /// Upper limit of the length of an array header \[bytes\].
 const MAX_HEADER_LEN: u64 = 1024;
 
@@ -83,11 +99,20 @@ impl RecordedArrays {
             let head = file
                 .read_prefix(&format!("{name}.npy"), MAX_HEADER_LEN)
                 .map_err(|error| read_error(path, none, error))?;
-            let Some((descr, shape, _)) = head.as_deref().and_then(npy::parse) else { continue };
-            // Images are not used by replay.
-            if descr == "<f8" || (name.starts_with("events/") && ["<i4", "|u1"].contains(&descr)) {
-                arrays.insert(name, Array { shape, numbers: OnceLock::new() });
+            let Some((head, size)) = head else { continue };
+            let Some((descr, shape, data)) = npy::parse(&head) else { continue };
+            let width = match descr {
+                "<f8" => 8,
+                "<i4" if name.starts_with("events/") => 4,
+                "|u1" if name.starts_with("events/") => 1,
+                // Images are not used by replay.
+                _ => continue,
+            };
+            let values = size.saturating_sub((head.len() - data.len()) as u64) / width;
+            if !fits(&shape, values) {
+                return Err(malformed(&wrong_count(&name)));
             }
+            arrays.insert(name, Array { shape, numbers: OnceLock::new() });
         }
         Ok(Self { path: path.into(), metadata, content: Content::Npz(Mutex::new(file)), arrays })
     }
@@ -117,13 +142,7 @@ impl RecordedArrays {
             "<i4" => data.as_chunks::<4>().0.iter().map(|bytes| i32::from_le_bytes(*bytes).into()).collect(),
             _ => data.iter().map(|byte| f64::from(*byte)).collect(),
         };
-        let product = |shape: &[usize]| shape.iter().try_fold(1_usize, |all, axis| all.checked_mul(*axis));
-        // The product of the other axes must not overflow, even if one axis is empty.
-        let filled: Vec<usize> = shape.iter().copied().filter(|length| *length > 0).collect();
-        if product(shape) != Some(numbers.len()) || product(&filled).is_none() {
-            return Err(self.malformed(format!("the number of values of {name} does not match its shape")));
-        }
-        Ok(numbers)
+        if fits(shape, numbers.len() as u64) { Ok(numbers) } else { Err(self.malformed(wrong_count(name))) }
     }
 
     /// Initial state of the recording.

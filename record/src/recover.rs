@@ -2,16 +2,13 @@
 
 use crate::error::{RecordError, Result};
 use crate::file::{PartialFile, lock_partial_file, partial_path_of, remove_file_if_exists};
+use crate::mcap_records::{ReadError, visit_records};
 use crate::mcap_writer::{io_error, options};
 use mcap::records::{AttachmentHeader, Record};
-use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use mcap::{Attachment, McapError, Writer};
 use std::fs::File;
 use std::io::{self, BufWriter, Read, Seek, SeekFrom, Write};
 use std::path::Path;
-
-/// Upper limit of the uncompressed size of a chunk \[bytes\], or the size of the file if that is larger.
-const LARGEST_CHUNK: usize = 1 << 30;
 
 /// Number of recovered messages, and damage of the partial file, from [`recover`].
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -63,7 +60,7 @@ pub fn recover_to(path: impl AsRef<Path>, to: impl AsRef<Path>) -> Result<Recove
     let (mut part, file) = PartialFile::create_as(to, on_the_way, false)?;
     let failed = |error: McapError| RecordError::file(to, io_error(error));
     let mut writer = options().create(BufWriter::new(file)).map_err(failed)?;
-    let recovered = match copy(&mut locked, &mut writer) {
+    let recovered = match copy(&locked, &mut writer) {
         Ok(recovered) => recovered,
         Err(CopyError::Read(error)) => return Err(failed_to_read(error)),
         Err(CopyError::Write(error)) => return Err(failed(error)),
@@ -86,65 +83,51 @@ enum CopyError {
     Write(McapError),
 }
 
-/// Copies everything from complete and undamaged chunks at the beginning of a file. Checksums are verified before the
-/// content of a chunk is used, because a wrong length could request any amount of memory.
-fn copy(from: &mut File, to: &mut Writer<impl Write + Seek>) -> std::result::Result<Recovered, CopyError> {
-    let bytes = from.metadata().map_err(CopyError::Read)?.len();
-    let options = LinearReaderOptions::default()
-        .with_skip_end_magic(true)
-        .with_prevalidate_chunk_crcs(true)
-        .with_record_length_limit(usize::try_from(bytes).unwrap_or(usize::MAX).max(LARGEST_CHUNK));
-    let mut reader = LinearReader::new_with_options(options);
+/// Copies everything from complete and undamaged chunks at the beginning of a file.
+fn copy(from: &File, to: &mut Writer<impl Write + Seek>) -> std::result::Result<Recovered, CopyError> {
     let mut recovered = Recovered { messages: 0, damage: None };
-    while let Some(event) = reader.next_event() {
-        let (opcode, data) = match event {
-            Ok(LinearReadEvent::ReadRequest(wanted)) => {
-                let count = from.read(reader.insert(wanted)).map_err(CopyError::Read)?;
-                reader.notify_read(count);
-                continue;
-            }
-            Ok(LinearReadEvent::Record { opcode, data }) => (opcode, data),
-            // The process was killed here.
-            Err(McapError::UnexpectedEof) => break,
-            Err(error) => {
-                recovered.damage = Some(error.to_string());
-                break;
-            }
-        };
-        let copied = match mcap::parse_record(opcode, data) {
-            Ok(Record::Schema { header, data }) => {
-                to.add_schema_with_id(header.id, &header.name, &header.encoding, &data).map(|_| ())
-            }
-            Ok(Record::Channel(channel)) => {
-                let mcap::records::Channel { id, schema_id, topic, message_encoding, metadata } = channel;
-                to.add_channel_with_id(id, schema_id, &topic, &message_encoding, &metadata).map(|_| ())
-            }
-            Ok(Record::Message { header, data }) => {
-                let written = to.write_to_known_channel(&header, &data);
-                recovered.messages += u64::from(written.is_ok());
-                written
-            }
-            Ok(Record::Attachment { header, data, .. }) => {
-                let AttachmentHeader { log_time, create_time, name, media_type } = header;
-                to.attach(&Attachment { log_time, create_time, name, media_type, data })
-            }
-            Ok(Record::Metadata(metadata)) => to.write_metadata(&metadata),
-            Ok(_) => Ok(()),
-            // Other messages may be complete. The damage is reported.
-            Err(error) => {
-                recovered.damage.get_or_insert(error.to_string());
-                Ok(())
-            }
-        };
-        match copied {
-            Ok(()) => {}
-            Err(McapError::Io(error)) => return Err(CopyError::Write(McapError::Io(error))),
-            // Contradicting records are damage.
-            Err(error) => {
-                recovered.damage = Some(error.to_string());
-                break;
-            }
+    let read = visit_records(from, false, |record| match record {
+        Ok(record) => copy_record(record, to, &mut recovered.messages),
+        // Other messages may be complete. The damage is reported.
+        Err(error) => {
+            recovered.damage.get_or_insert(error.to_string());
+            Ok(())
         }
+    });
+    match read {
+        // The process was killed here.
+        Ok(()) | Err(ReadError::Format(McapError::UnexpectedEof)) => {}
+        Err(ReadError::File(error)) => return Err(CopyError::Read(error)),
+        Err(ReadError::Visitor(McapError::Io(error))) => return Err(CopyError::Write(McapError::Io(error))),
+        // Contradicting records are damage.
+        Err(ReadError::Format(error) | ReadError::Visitor(error)) => recovered.damage = Some(error.to_string()),
     }
     Ok(recovered)
+}
+
+fn copy_record(
+    record: Record<'_>,
+    to: &mut Writer<impl Write + Seek>,
+    messages: &mut u64,
+) -> std::result::Result<(), McapError> {
+    match record {
+        Record::Schema { header, data } => {
+            to.add_schema_with_id(header.id, &header.name, &header.encoding, &data).map(|_| ())
+        }
+        Record::Channel(channel) => {
+            let mcap::records::Channel { id, schema_id, topic, message_encoding, metadata } = channel;
+            to.add_channel_with_id(id, schema_id, &topic, &message_encoding, &metadata).map(|_| ())
+        }
+        Record::Message { header, data } => {
+            to.write_to_known_channel(&header, &data)?;
+            *messages += 1;
+            Ok(())
+        }
+        Record::Attachment { header, data, .. } => {
+            let AttachmentHeader { log_time, create_time, name, media_type } = header;
+            to.attach(&Attachment { log_time, create_time, name, media_type, data })
+        }
+        Record::Metadata(metadata) => to.write_metadata(&metadata),
+        _ => Ok(()),
+    }
 }

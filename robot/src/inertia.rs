@@ -46,7 +46,7 @@ pub struct RigidInertia {
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum InertiaFault {
-    /// A number is infinite or not a number.
+    /// A number or a principal moment is infinite or not a number.
     #[error("mass, center of mass or inertia is not finite")]
     NotFinite,
     /// The mass is negative, zero, or too small for MuJoCo.
@@ -131,7 +131,8 @@ impl RigidInertia {
     pub fn principal(&self) -> (Vector3<f64>, UnitQuaternion<f64>) {
         let (mut moments, axes) = sorted_eigen(&symmetric_part(&self.inertia));
         let missing = moments[0] - (moments[1] + moments[2]);
-        if missing > 0.0 && missing <= ROUNDING * moments[0] {
+        // Infinite moments of a tensor whose numbers are close to the largest ones have no next number to end at.
+        if missing > 0.0 && missing <= ROUNDING * moments[0] && missing.is_finite() {
             while moments[1] + moments[2] < moments[0] {
                 moments[1] = moments[1].next_up();
             }
@@ -160,6 +161,9 @@ impl RigidInertia {
             return Err(InertiaFault::NotSymmetric);
         }
         let (moments, _) = self.principal();
+        if has_overflow(&moments) {
+            return Err(InertiaFault::NotFinite);
+        }
         let [c, b, a] = [moments[0], moments[1], moments[2]];
         if a < MUJOCO_MIN_MOMENT {
             return Err(InertiaFault::NotPositiveDefinite { smallest: a });
@@ -193,8 +197,12 @@ impl RigidInertia {
             inertia: symmetric_part(&self.inertia.map(finite_or_zero)),
         };
         let mut done = vec![format!("{fault}")];
-        if fault == InertiaFault::NotFinite {
+        if fixed.mass != self.mass || fixed.com != self.com || self.inertia.iter().any(|x| !x.is_finite()) {
             done.push("numbers that are not finite were set to 0".to_owned());
+        }
+        if has_overflow(&sorted_eigen(&fixed.inertia).0) {
+            fixed.inertia = Matrix3::zeros();
+            done.push("the inertia, whose principal moments are too large for a number, was set to 0".to_owned());
         }
         if fixed.mass < MUJOCO_MIN_MASS {
             fixed.mass = REPAIR_MASS;
@@ -225,6 +233,11 @@ impl RigidInertia {
 /// Inertia tensor `tr(Σ) 1 - Σ` of a body with the second moment Σ.
 fn second_moment_to_inertia(second_moment: &Matrix3<f64>) -> Matrix3<f64> {
     Matrix3::from_diagonal_element(second_moment.trace()) - second_moment
+}
+
+/// True if the moments or their sum are no finite numbers.
+fn has_overflow(moments: &Vector3<f64>) -> bool {
+    !moments.sum().is_finite()
 }
 
 fn symmetric_part(m: &Matrix3<f64>) -> Matrix3<f64> {
@@ -431,5 +444,17 @@ mod tests {
         assert!(what.contains("the mass was set"), "{what}");
         let (point, _) = diagonal(1.2, 0.0, 0.0, 0.0).repaired();
         assert!((point.principal().0 - Vector3::repeat(2e-7)).amax() < 1e-20);
+    }
+
+    /// Root cause: principal moments above the largest number are infinite, and the middle one was raised for ever.
+    #[test]
+    fn moments_above_the_largest_number() {
+        for element in [8e307, 1.7e308] {
+            let huge = body(1.0, Matrix3::from_element(element));
+            assert_eq!(huge.check(), Err(InertiaFault::NotFinite));
+            let (repaired, done) = huge.repaired();
+            assert!(mujoco_accepts(&repaired) && repaired.inertia.iter().all(|x| x.is_finite()), "{repaired:?}");
+            assert!(done.contains("too large for a number") && !done.contains("not finite were set"), "{done}");
+        }
     }
 }

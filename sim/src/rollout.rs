@@ -163,7 +163,9 @@ impl SimulationManager {
             Ok(())
         };
         std::thread::scope(|scope| -> Result<()> {
-            let others: Vec<_> = (1..threads).map(|_| scope.spawn(run)).collect();
+            // Where the system refuses a thread, fewer do the same work.
+            let start = |_| std::thread::Builder::new().spawn_scoped(scope, run).ok();
+            let others: Vec<_> = (1..threads).map_while(start).collect();
             let mine = run();
             others.into_iter().try_for_each(|other| match other.join() {
                 Ok(done) => done,

@@ -2,18 +2,14 @@
 
 use super::{FieldSelector, RecordedTopic, TimeSeries};
 use crate::error::{RecordError, Result};
+use crate::mcap_records::{ReadError, visit_records};
 use crate::ros::{MessageType, PathSegment, SCENE_UPDATE, Value};
 use mcap::records::Record;
-use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use mcap::{Attachment, McapError};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::File;
-use std::io::{BufReader, Read};
 use std::path::Path;
 use std::sync::Arc;
-
-/// Upper limit of the uncompressed size of a chunk \[bytes\], or the size of the file if that is larger.
-const MAX_CHUNK: usize = 1 << 30;
 
 /// A channel with its message type; `None` for types that cannot be read.
 pub(super) struct McapChannel {
@@ -33,61 +29,50 @@ pub(super) enum McapItem<'r> {
 pub(super) fn visit_items(path: &Path, mut visit: impl FnMut(McapItem<'_>) -> Result<()>) -> Result<()> {
     let failed = |error: std::io::Error| RecordError::file(path, error);
     let file = File::open(path).map_err(failed)?;
-    let bytes = file.metadata().map_err(failed)?.len();
     let malformed = |what: String| RecordError::Malformed { path: path.into(), what };
     let truncated = || {
         let text = "it is truncated; `kinetoscope recover` (record::recover) makes a complete file of the partial file of a \
                     killed recorder";
         malformed(text.into())
     };
-    let options = LinearReaderOptions::default()
-        .with_prevalidate_chunk_crcs(true)
-        .with_record_length_limit(usize::try_from(bytes).unwrap_or(usize::MAX).max(MAX_CHUNK));
-    let (mut reader, mut file) = (LinearReader::new_with_options(options), BufReader::with_capacity(1 << 20, file));
     let mut schemas: BTreeMap<u16, (String, Option<Arc<MessageType>>)> = BTreeMap::new();
     let mut channels: BTreeMap<u16, McapChannel> = BTreeMap::new();
-    while let Some(event) = reader.next_event() {
-        match event {
-            Ok(LinearReadEvent::ReadRequest(wanted)) => {
-                let count = file.read(reader.insert(wanted)).map_err(failed)?;
-                reader.notify_read(count);
+    let read = visit_records(&file, true, |record| {
+        match record.map_err(|error| malformed(error.to_string()))? {
+            Record::Schema { header, data } => {
+                // Scene messages have no numbers over time.
+                let numbers = header.encoding == "ros2msg" && header.name != SCENE_UPDATE;
+                let text = numbers.then(|| std::str::from_utf8(&data).ok()).flatten();
+                let reads = text.and_then(MessageType::parse).map(Arc::new);
+                schemas.insert(header.id, (header.name, reads));
             }
-            Ok(LinearReadEvent::Record { opcode, data }) => {
-                match mcap::parse_record(opcode, data).map_err(|error| malformed(error.to_string()))? {
-                    Record::Schema { header, data } => {
-                        // Scene messages have no numbers over time.
-                        let numbers = header.encoding == "ros2msg" && header.name != SCENE_UPDATE;
-                        let text = numbers.then(|| std::str::from_utf8(&data).ok()).flatten();
-                        let reads = text.and_then(MessageType::parse).map(Arc::new);
-                        schemas.insert(header.id, (header.name, reads));
-                    }
-                    Record::Channel(channel) => {
-                        let (type_name, reads) = schemas.get(&channel.schema_id).cloned().unwrap_or_default();
-                        let message_type = reads.filter(|_| channel.message_encoding == "cdr");
-                        channels.insert(channel.id, McapChannel { topic: channel.topic, type_name, message_type });
-                    }
-                    Record::Message { header, data } => {
-                        let Some(channel) = channels.get(&header.channel_id) else {
-                            return Err(malformed(format!(
-                                "a message refers to channel {}, which does not exist",
-                                header.channel_id
-                            )));
-                        };
-                        visit(McapItem::Message { channel, time: header.log_time, data: &data })?;
-                    }
-                    Record::Attachment { header, data, .. } => {
-                        let mcap::records::AttachmentHeader { log_time, create_time, name, media_type } = header;
-                        visit(McapItem::Attachment(Attachment { log_time, create_time, name, media_type, data }))?;
-                    }
-                    _ => {}
-                }
+            Record::Channel(channel) => {
+                let (type_name, reads) = schemas.get(&channel.schema_id).cloned().unwrap_or_default();
+                let message_type = reads.filter(|_| channel.message_encoding == "cdr");
+                channels.insert(channel.id, McapChannel { topic: channel.topic, type_name, message_type });
             }
-            Err(McapError::UnexpectedEof) => return Err(truncated()),
-            Err(McapError::BadMagic) => return Err(malformed("this is not an MCAP file, or it is incomplete".into())),
-            Err(error) => return Err(malformed(error.to_string())),
+            Record::Message { header, data } => {
+                let Some(channel) = channels.get(&header.channel_id) else {
+                    let what = format!("a message refers to channel {}, which does not exist", header.channel_id);
+                    return Err(malformed(what));
+                };
+                visit(McapItem::Message { channel, time: header.log_time, data: &data })?;
+            }
+            Record::Attachment { header, data, .. } => {
+                let mcap::records::AttachmentHeader { log_time, create_time, name, media_type } = header;
+                visit(McapItem::Attachment(Attachment { log_time, create_time, name, media_type, data }))?;
+            }
+            _ => {}
         }
-    }
-    Ok(())
+        Ok(())
+    });
+    read.map_err(|error| match error {
+        ReadError::File(error) => failed(error),
+        ReadError::Format(McapError::UnexpectedEof) => truncated(),
+        ReadError::Format(McapError::BadMagic) => malformed("this is not an MCAP file, or it is incomplete".into()),
+        ReadError::Format(error) => malformed(error.to_string()),
+        ReadError::Visitor(error) => error,
+    })
 }
 
 /// Lists the topics, and warnings about unreadable messages.

@@ -151,16 +151,14 @@ impl MessageType {
             (FieldType::Text, Some(count)) => (0..count).map(|_| bytes.text()).collect::<Option<_>>().map(Value::Texts),
             (FieldType::Other(name), count) => {
                 let fields = self.fields_of(name)?;
+                // Rejects a type without bytes, of which a message could have any number.
+                let mut each = || {
+                    let begin = bytes.at;
+                    self.read_struct(bytes, fields, depth + 1).filter(|_| bytes.at > begin)
+                };
                 match count {
-                    None => self.read_struct(bytes, fields, depth + 1),
-                    Some(count) => {
-                        // Rejects a type without fields, which could have any count.
-                        let each = (0..count).map(|_| {
-                            let begin = bytes.at;
-                            self.read_struct(bytes, fields, depth + 1).filter(|_| bytes.at > begin)
-                        });
-                        each.collect::<Option<_>>().map(Value::List)
-                    }
+                    None => each(),
+                    Some(count) => (0..count).map(|_| each()).collect::<Option<_>>().map(Value::List),
                 }
             }
         }

@@ -5,6 +5,7 @@ mod archives;
 mod contents;
 mod episodes;
 mod errors;
+mod hostile;
 mod images;
 mod kill;
 mod lerobot;
