@@ -26,8 +26,9 @@ const SCRIPTS: &str = "../shared/seeds";
 const WANTS_TORCH: &str = "KINETOSCOPE_TORCH";
 
 /// Packages of the tests. `create_sensor` of EmbodiChain calls a method that NumPy 2 does not have.
-const PACKAGES: [&str; 7] = [
+const PACKAGES: [&str; 8] = [
     "numpy==1.26.4",
+    "gymnasium==1.4.0",
     "pytest==9.2.0",
     "scipy==1.17.1",
     "matplotlib==3.11.2",
@@ -122,7 +123,7 @@ fn prepare(repo: &Repo) -> XtaskResult<Prepared> {
 fn environment(repo: &Repo) -> XtaskResult<PathBuf> {
     let venv = repo.target.join("python-sim-venv");
     let python = venv.join("bin/python");
-    let check = "import cv2, matplotlib, mypy, numpy, pytest, scipy, PIL; assert numpy.__version__ == '1.26.4'";
+    let check = "import cv2, gymnasium, matplotlib, mypy, numpy, pytest, scipy, PIL; assert numpy.__version__ == '1.26.4'";
     let is_ready = || Cmd::new(&python).args(["-c", check]).quiet().succeeds();
     if !is_ready() {
         let core = format!("mujoco-core=={}", wheel::VERSION);

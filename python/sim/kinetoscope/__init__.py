@@ -49,19 +49,27 @@ from .errors import *  # noqa: E402, F403
 if TYPE_CHECKING:
     from kinetoscope_render import BatchRenderer, Renderer, patch_mujoco
 
-# Loaded at the first use: the renderer imports mujoco, which takes longer than all of this package.
-_RENDERER = ("BatchRenderer", "Renderer", "patch_mujoco")
+    from .vector_env import VectorEnv
+
+# Loaded at the first use: the renderer imports mujoco, and environments import gymnasium. Each takes longer than all of this
+# package.
+_LATER = {
+    "BatchRenderer": "kinetoscope_render",
+    "Renderer": "kinetoscope_render",
+    "VectorEnv": "kinetoscope.vector_env",
+    "patch_mujoco": "kinetoscope_render",
+}
 
 
 def __getattr__(name: str) -> Any:
-    """The renderer of the package kinetoscope-render."""
-    if name in _RENDERER:
-        return getattr(importlib.import_module("kinetoscope_render"), name)
+    """Classes of other packages, and those that need other packages."""
+    if name in _LATER:
+        return getattr(importlib.import_module(_LATER[name]), name)
     raise AttributeError(f"module 'kinetoscope' has no attribute {name!r}")
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *_RENDERER})
+    return sorted({*globals(), *_LATER})
 
 
 __all__ = [
@@ -82,6 +90,7 @@ __all__ = [
     "Task",
     "Terrain",
     "Topic",
+    "VectorEnv",
     "Weld",
     "Window",
     "__version__",

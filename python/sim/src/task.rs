@@ -9,7 +9,8 @@ use crate::values::Values;
 use kinetoscope::ndarray::{Array1, Ix1, Ix2};
 use kinetoscope::sim::SimulationManager;
 use kinetoscope::tasks::{
-    Env, EnvBuilder, EnvError, ImageBatch, ImageElement, ObservationGroup, POLICY_GROUP, Space, TaskCfg, TermRegistry,
+    AutoresetMode, Env, EnvBuilder, EnvError, ImageBatch, ImageElement, ObservationGroup, POLICY_GROUP, Space, TaskCfg,
+    TermRegistry,
 };
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -99,6 +100,30 @@ impl Task {
     #[getter]
     fn num_envs(&self) -> usize {
         self.shared.num_envs()
+    }
+
+    /// Type of observations: "float64" or "float32".
+    #[getter]
+    fn dtype(&self) -> &'static str {
+        if self.is_single { "float32" } else { "float64" }
+    }
+
+    /// Mode of automatic resets: "next_step", "same_step" or "disabled".
+    #[getter]
+    fn autoreset(&self, py: Python<'_>) -> PyResult<&'static str> {
+        self.shared.task(py, self.number, |env| {
+            Ok(match env.cfg().autoreset {
+                AutoresetMode::NextStep => "next_step",
+                AutoresetMode::SameStep => "same_step",
+                AutoresetMode::Disabled => "disabled",
+            })
+        })
+    }
+
+    /// Limit of an episode in steps, or None.
+    #[getter]
+    fn episode_steps(&self, py: Python<'_>) -> PyResult<Option<u64>> {
+        self.shared.task(py, self.number, |env| Ok(env.cfg().episode_steps))
     }
 
     /// Duration of a step [s].
