@@ -22,7 +22,11 @@ from .assets import asset
 from .errors import UnknownNameError
 from .vector_env import Env, VectorEnv
 
-TASKS = {"Balance-v0": "balance", "QuadrupedVelocity-v0": "quadruped_velocity"}
+TASKS = {
+    "Balance-v0": "balance",
+    "QuadrupedVelocity-v0": "quadruped_velocity",
+    "QuadrupedVelocityRough-v0": "quadruped_velocity_rough",
+}
 """Folders of the ready-made tasks, by their name in Gymnasium behind ``Kinetoscope/``."""
 
 

@@ -12,6 +12,7 @@ mod episodes;
 mod groups;
 mod mistakes;
 mod observations;
+mod ready_made;
 mod shared_state;
 mod task_text;
 mod terms;
