@@ -2,7 +2,7 @@
 
 use crate::observation::ObservationTerm;
 use kinetoscope_sim::RobotId;
-use ndarray::s;
+use ndarray::{Axis, Slice};
 
 const AXES: [&str; 3] = ["x", "y", "z"];
 
@@ -23,5 +23,7 @@ pub fn projected_gravity(name: &str, robot: RobotId) -> ObservationTerm {
 
 /// Height of the root link's origin in the environment frame \[m\], not above terrain.
 pub fn base_pos_z(name: &str, robot: RobotId) -> ObservationTerm {
-    ObservationTerm::new(name, ["z"], move |now| Ok(now.robot(robot).root_pose().slice(s![.., 2..3]).to_owned()))
+    ObservationTerm::new(name, ["z"], move |now| {
+        Ok(now.robot(robot).root_pose().slice_axis(Axis(1), Slice::from(2..3)).to_owned())
+    })
 }

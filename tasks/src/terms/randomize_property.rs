@@ -12,8 +12,8 @@ use std::collections::BTreeMap;
 /// random number of its own for each body. Isaac Lab's `randomize_rigid_body_mass` does the same. Moments of inertia
 /// change in proportion.
 ///
-/// `patterns` match whole names of bodies, `uid/link` or the uid of an object. Operations change the nominal mass, not
-/// the present one.
+/// `patterns` match whole names of bodies, `uid/link` or the uid of an object; links behind fixed joints are part of the
+/// link that they are fused to. Operations change the nominal mass, not the present one.
 ///
 /// # Errors
 /// A pattern is invalid or matches no body, two patterns match the same body, or the ends of the range are not finite

@@ -3,7 +3,7 @@
 use crate::reward::RewardTerm;
 use kinetoscope_sensors::ContactSensor;
 use kinetoscope_sim::SensorId;
-use ndarray::Axis;
+use ndarray::{ArrayView1, Axis};
 
 /// Number of the sensor's bodies whose net normal contact force
 /// ([`net_forces_w`](ContactSensor::net_forces_w)) exceeds `force` \[N\] in the current measurement or one of the
@@ -12,11 +12,10 @@ pub fn undesired_contacts(name: &str, weight: f64, sensor: SensorId<ContactSenso
     RewardTerm::new(name, weight, move |now| {
         let sensor = now.sim().sensor(sensor)?;
         let (present, history) = (sensor.net_forces_w(), sensor.net_forces_w_history());
-        let exceeds = |f: ndarray::ArrayView1<'_, f64>| f.iter().map(|x| x * x).sum::<f64>().sqrt() > force;
+        let exceeds = |f: ArrayView1<'_, f64>| f.iter().map(|x| x * x).sum::<f64>().sqrt() > force;
         let touches = |env: usize, body: usize| {
-            let earlier = history.index_axis(Axis(0), env);
-            exceeds(present.slice(ndarray::s![env, body, ..]))
-                || earlier.outer_iter().any(|forces| exceeds(forces.row(body)))
+            let (present, earlier) = (present.index_axis(Axis(0), env), history.index_axis(Axis(0), env));
+            exceeds(present.row(body)) || earlier.outer_iter().any(|forces| exceeds(forces.row(body)))
         };
         let count = |env: usize| (0..present.len_of(Axis(1))).filter(|body| touches(env, *body)).count() as f64;
         Ok((0..now.num_envs()).map(count).collect())

@@ -166,14 +166,14 @@ fn values() {
         let wave = |env: usize, k: usize| (0.2 * step as f64 + k as f64 + env as f64).sin();
         let actions = Array2::from_shape_fn((n, dof), |(env, k)| wave(env, k));
         let result = env.step(&actions).unwrap();
-        for e in 0..n {
+        for (e, (feet_times, speeds)) in times.iter_mut().zip(&mut speeds).enumerate() {
             let (qpos, qvel) =
                 env.sim().with_mujoco(EnvId(e), |_, data| (data.qpos().to_vec(), data.qvel().to_vec())).unwrap();
             let force = |sensor: &ContactSensor, body: usize| {
                 sensor.net_forces_w().slice(s![e, body, ..]).iter().map(|f| f * f).sum::<f64>().sqrt()
             };
             let mut landed = Vec::new();
-            for (body, foot) in times[e].iter_mut().enumerate() {
+            for (body, foot) in feet_times.iter_mut().enumerate() {
                 let touches = force(env.sim().sensor(feet).unwrap(), body) > 1.0;
                 if touches && !foot.in_contact {
                     landed.push(foot.air);
@@ -188,7 +188,7 @@ fn values() {
                 linear: Vector3::from_column_slice(&qvel[..3]),
                 angular: Vector3::from_column_slice(&qvel[3..6]),
                 joints: qpos[7..].to_vec(),
-                accelerations: qvel[6..].iter().zip(&speeds[e]).map(|(new, old)| (new - old) / dt).collect(),
+                accelerations: qvel[6..].iter().zip(speeds.iter()).map(|(new, old)| (new - old) / dt).collect(),
                 speeds: qvel[6..].to_vec(),
                 starts: starts.clone(),
                 landings: landed,
@@ -205,7 +205,7 @@ fn values() {
             for (what, (found, expected)) in [("observations", observed), ("rewards", rewards)] {
                 assert_close(&format!("step {step}, environment {e}, {what}"), found, expected, close);
             }
-            speeds[e] = state.speeds;
+            *speeds = state.speeds;
         }
     }
     assert!(landings > 3 && contacts > 10, "{landings} landings, {contacts} contacts");
@@ -273,7 +273,7 @@ fn pushes_and_properties() {
         [events]
         mass = { type = "randomize_mass", mode = "reset", bodies = ["quadruped/base"], op = { add = [-1, 2] } }
         legs = { type = "randomize_mass", bodies = ["quadruped/.*THIGH"], op = { scale = [0.5, 1.5] } }
-        friction = { type = "randomize_friction", bodies = ["quadruped/.*FOOT", "ground"], op = { set = [0.3, 0.9] } }
+        friction = { type = "randomize_friction", bodies = ["quadruped/.*SHANK", "ground"], op = { set = [0.3, 0.9] } }
         push = { type = "push_by_setting_velocity", mode = { interval = [2, 2] }, linear = [[0.5, 0.5], [0, 0.25], [0, 0]] }
     "#;
     let run = |num_envs: usize| {
@@ -290,7 +290,7 @@ fn pushes_and_properties() {
             };
             values.extend(thighs.iter().map(ratio));
             values.push(properties.get(Property::Friction, "ground").unwrap()[0]);
-            values.push(properties.get(Property::Friction, "quadruped/LF_FOOT").unwrap()[0]);
+            values.push(properties.get(Property::Friction, "quadruped/LF_SHANK").unwrap()[0]);
             values
         };
         let nominal =
