@@ -51,10 +51,11 @@ const MAX_EMPTY_ROW: u64 = 1 << 24;
 /// True if an array of this shape has `values` values. The values of a row are counted even if the array has no row,
 /// because readers name each of them.
 fn fits(shape: &[usize], values: u64) -> bool {
-    let product =
-        |axes: &mut dyn Iterator<Item = usize>| axes.try_fold(1, |all: u64, axis| all.checked_mul(axis as u64));
-    let filled = product(&mut shape.iter().copied().filter(|length| *length > 0));
-    product(&mut shape.iter().copied()) == Some(values) && filled.is_some_and(|all| all <= values.max(MAX_EMPTY_ROW))
+    let product = |smallest: usize| {
+        shape.iter().filter(|axis| **axis >= smallest).try_fold(1, |all: u64, axis| all.checked_mul(*axis as u64))
+    };
+    let (all, without_empty_axes) = (product(0), product(1));
+    all == Some(values) && without_empty_axes.is_some_and(|all| all <= values.max(MAX_EMPTY_ROW))
 }
 
 fn wrong_count(name: &str) -> String {

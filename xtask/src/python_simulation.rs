@@ -123,7 +123,8 @@ fn prepare(repo: &Repo) -> XtaskResult<Prepared> {
 fn environment(repo: &Repo) -> XtaskResult<PathBuf> {
     let venv = repo.target.join("python-sim-venv");
     let python = venv.join("bin/python");
-    let check = "import cv2, gymnasium, matplotlib, mypy, numpy, pytest, scipy, PIL; assert numpy.__version__ == '1.26.4'";
+    let check =
+        "import cv2, gymnasium, matplotlib, mypy, numpy, pytest, scipy, PIL; assert numpy.__version__ == '1.26.4'";
     let is_ready = || Cmd::new(&python).args(["-c", check]).quiet().succeeds();
     if !is_ready() {
         let core = format!("mujoco-core=={}", wheel::VERSION);

@@ -286,10 +286,33 @@ fn folders_without_tests(metadata: &Value, root: &Path) -> Vec<String> {
 }
 
 fn tests_that_never_run(files: &[TextFile], folders: &[String]) -> Vec<String> {
-    let is_there = |file: &&TextFile| file.is_rust() && folders.iter().any(|folder| file.path.starts_with(folder));
+    // Files that a test binary includes as its own modules.
+    let included: Vec<String> = files.iter().filter(|file| file.is_rust()).flat_map(included_files).collect();
+    let is_there = |file: &&TextFile| {
+        let is_below = |folder: &String| file.path.starts_with(folder);
+        file.is_rust() && folders.iter().any(is_below) && !included.contains(&file.path)
+    };
     let has_test = |file: &&TextFile| code_only(&file.text).contains("#[test]");
     let files = files.iter().filter(is_there).filter(has_test);
     files.map(|file| format!("{}: this test never runs: its package has `test = false`", file.path)).collect()
+}
+
+/// Files that the attributes `#[path = ".."]` of a file name.
+fn included_files(file: &TextFile) -> Vec<String> {
+    let names = file.text.split("#[path = \"").skip(1).filter_map(|rest| rest.split('"').next());
+    let folder: Vec<&str> = file.path.split('/').collect();
+    let resolve = |name: &str| {
+        let mut parts = folder[..folder.len() - 1].to_vec();
+        for part in name.split('/') {
+            if part == ".." {
+                parts.pop();
+            } else {
+                parts.push(part);
+            }
+        }
+        parts.join("/")
+    };
+    names.map(resolve).collect()
 }
 
 fn line_of(text: &str, at: usize) -> usize {
@@ -520,6 +543,9 @@ mod tests {
         ] {
             assert_eq!(tests_that_never_run(&file(path, text), &folders).len(), found, "{path}");
         }
+        let mut files = file("cli/src/a.rs", test);
+        files.extend(file("cli/tests/cli/main.rs", "#[path = \"../../src/a.rs\"]\nmod a;"));
+        assert!(tests_that_never_run(&files, &folders).is_empty());
     }
 
     #[test]
