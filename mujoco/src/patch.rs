@@ -9,6 +9,7 @@ use super::editor::set_pointer;
 use super::model::{Model, OwnArray, ShallowModel, Storage, array_pointer};
 use super::weld::Weld;
 use mujoco_sys as mj;
+use mujoco_sys::fields::model as fields;
 use mujoco_sys::fields::model::{ModelArray, each};
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -83,6 +84,63 @@ pub struct ModelPatch {
 #[derive(Debug)]
 struct Welded(Option<Arc<ModelPatch>>);
 
+/// Array of numbers (`f64`) of a model, to be read for a patch without a model that has it.
+#[derive(Clone, Copy, Debug)]
+pub struct NumberArray {
+    name: &'static str,
+    /// The array in the compiled model.
+    compiled: fn(&Model) -> &[f64],
+}
+
+macro_rules! number_arrays {
+    ($($constant:ident = $name:ident;)*) => {
+        impl NumberArray {
+            $(
+                #[doc = concat!("MuJoCo's `", stringify!($name), "`, as in [`Model::", stringify!($name), "`].")]
+                pub const $constant: Self = Self {
+                    name: stringify!($name),
+                    // SAFETY: the compiled model lives as long as `model`, and nothing writes to it.
+                    compiled: |model| unsafe { fields::$name(model.compiled()) },
+                };
+            )*
+        }
+    };
+}
+
+number_arrays! {
+    BODY_MASS = body_mass;
+    BODY_INERTIA = body_inertia;
+    BODY_IPOS = body_ipos;
+    BODY_POS = body_pos;
+    DOF_DAMPING = dof_damping;
+    GEOM_FRICTION = geom_friction;
+    GEOM_SIZE = geom_size;
+}
+
+impl NumberArray {
+    /// Numbers of the array in the compiled model of `model` with the differences `patch`.
+    pub fn all(self, model: &Model, patch: Option<&ModelPatch>) -> Vec<f64> {
+        let mut numbers = (self.compiled)(model).to_vec();
+        if let Some(patch) = patch {
+            patch.overlay(self, 0, &mut numbers);
+        }
+        numbers
+    }
+
+    /// `K` numbers as in [`all`](Self::all), from index `first` on.
+    ///
+    /// # Panics
+    /// The array has fewer than `first + K` numbers.
+    pub fn some<const K: usize>(self, model: &Model, patch: Option<&ModelPatch>, first: usize) -> [f64; K] {
+        let mut numbers = [0.0; K];
+        numbers.copy_from_slice(&(self.compiled)(model)[first..first + K]);
+        if let Some(patch) = patch {
+            patch.overlay(self, first, &mut numbers);
+        }
+        numbers
+    }
+}
+
 impl ModelPatch {
     /// Gravity in world axes \[m/s²\].
     pub fn gravity(&self) -> [f64; 3] {
@@ -98,14 +156,22 @@ impl ModelPatch {
         2 * size_of::<usize>() + size_of::<Self>() + size_of_val(&*self.values) + layout.div_ceil(owners) + unwelded
     }
 
-    /// Calls `visit` for the numbers that the patch has of an array of `f64`, with their indices.
-    pub fn for_each_number(&self, array: &str, mut visit: impl FnMut(usize, f64)) {
-        self.for_each(|field, span, values| {
-            if field.array.name == array {
-                let first = span.at as usize;
-                values.iter().enumerate().for_each(|(k, value)| visit(first + k, f64::from_bits(*value)));
+    /// Replaces the numbers that the patch has of an array in `numbers`, a part of the array from index `first` on.
+    fn overlay(&self, array: NumberArray, first: usize, numbers: &mut [f64]) {
+        let Some(field) = self.layout.fields.iter().find(|field| field.array.name == array.name) else { return };
+        let mut values = &self.values[..];
+        for span in &self.layout.spans {
+            let (mine, rest) = values.split_at(span.words as usize);
+            values = rest;
+            if span.field != field.index {
+                continue;
             }
-        });
+            for (at, value) in (span.at as usize..).zip(mine) {
+                if let Some(number) = at.checked_sub(first).and_then(|k| numbers.get_mut(k)) {
+                    *number = f64::from_bits(*value);
+                }
+            }
+        }
     }
 
     /// Names and sizes \[bytes\] of the arrays with differences.
