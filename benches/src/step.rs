@@ -2,7 +2,9 @@
 //! threads.
 //!
 //! Both sides start from the same states and do the same physics; this is checked bit by bit after every round. They
-//! are created in both orders, half the time each: ratios are geometric means of the two, rates are means.
+//! are created in both orders, half the time each: ratios are geometric means of the two, rates are means. The loop over
+//! rows copies positions and velocities after every step, as our side does; the loop with an `mjData` for each
+//! environment does not, because they stay readable there.
 
 use crate::interleave::{Contender, MeasurementCfg, in_both_orders, measure};
 use crate::models::{Case, Loop, STEPS};
@@ -84,6 +86,9 @@ struct RowsShare {
     data: Data,
     first: usize,
     rows: Vec<(IntegrationState, UserInputs)>,
+    /// Positions with normalized quaternions, and velocities, after the last step, environment by environment.
+    qpos: Vec<f64>,
+    qvel: Vec<f64>,
 }
 
 impl<'c> RowsLoop<'c> {
@@ -91,8 +96,10 @@ impl<'c> RowsLoop<'c> {
         let share = envs.div_ceil(threads);
         let mut shares = Vec::new();
         for first in (0..envs).step_by(share) {
-            let rows = vec![Default::default(); share.min(envs - first)];
-            shares.push(RowsShare { data: Data::new(&case.model)?, first, rows });
+            let count = share.min(envs - first);
+            let (qpos, qvel) = (vec![0.0; count * case.model.nq()], vec![0.0; count * case.model.nv()]);
+            let rows = vec![Default::default(); count];
+            shares.push(RowsShare { data: Data::new(&case.model)?, first, rows, qpos, qvel });
         }
         let mut rows = Self { case, shares };
         rows.restart()?;
@@ -102,12 +109,18 @@ impl<'c> RowsLoop<'c> {
 
 impl RowsShare {
     fn step(&mut self) -> bool {
-        let Self { data, rows, .. } = self;
-        rows.iter_mut().all(|(state, inputs)| {
+        let Self { data, rows, qpos, qvel, .. } = self;
+        let (nq, nv) = (data.model().nq(), data.model().nv());
+        let reads = qpos.chunks_exact_mut(nq).zip(qvel.chunks_exact_mut(nv));
+        rows.iter_mut().zip(reads).all(|((state, inputs), (qpos, qvel))| {
             state.restore(data);
             inputs.restore(data);
             let done = data.step1().and_then(|()| data.step2()).is_ok();
             state.save(data);
+            // As our side returns them; the saved state keeps the quaternions before that.
+            data.normalize_quaternions();
+            qpos.copy_from_slice(data.qpos());
+            qvel.copy_from_slice(data.qvel());
             done
         })
     }
@@ -135,15 +148,7 @@ impl Contender for RowsLoop<'_> {
     }
 
     fn qpos(&mut self) -> BenchResult<Option<Vec<f64>>> {
-        let mut qpos = Vec::new();
-        for RowsShare { data, rows, .. } in &mut self.shares {
-            for (state, _) in rows {
-                state.restore(data);
-                data.normalize_quaternions();
-                qpos.extend_from_slice(data.qpos());
-            }
-        }
-        Ok(Some(qpos))
+        Ok(Some(self.shares.iter().flat_map(|share| &share.qpos).copied().collect()))
     }
 }
 

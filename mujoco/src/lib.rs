@@ -69,7 +69,7 @@ pub use heap::trim_heap;
 pub use model::{Buffers, Compiled, Model};
 pub use name::ObjectKind;
 pub use options::OptionDifference;
-pub use patch::ModelPatch;
+pub use patch::{ModelPatch, NumberArray};
 pub use prefetch::prefetch;
 pub use ray::RayHit;
 pub use skin_flex::{Bone, FlexArrays, SkinArrays};

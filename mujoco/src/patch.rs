@@ -9,6 +9,7 @@ use super::editor::set_pointer;
 use super::model::{Model, OwnArray, ShallowModel, Storage, array_pointer};
 use super::weld::Weld;
 use mujoco_sys as mj;
+use mujoco_sys::fields::model as fields;
 use mujoco_sys::fields::model::{ModelArray, each};
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -83,6 +84,63 @@ pub struct ModelPatch {
 #[derive(Debug)]
 struct Welded(Option<Arc<ModelPatch>>);
 
+/// Array of numbers (`f64`) of a model, to be read for a patch without a model that has it.
+#[derive(Clone, Copy, Debug)]
+pub struct NumberArray {
+    name: &'static str,
+    /// The array in the compiled model.
+    compiled: fn(&Model) -> &[f64],
+}
+
+macro_rules! number_arrays {
+    ($($constant:ident = $name:ident;)*) => {
+        impl NumberArray {
+            $(
+                #[doc = concat!("MuJoCo's `", stringify!($name), "`, as in [`Model::", stringify!($name), "`].")]
+                pub const $constant: Self = Self {
+                    name: stringify!($name),
+                    // SAFETY: the compiled model lives as long as `model`, and nothing writes to it.
+                    compiled: |model| unsafe { fields::$name(model.compiled()) },
+                };
+            )*
+        }
+    };
+}
+
+number_arrays! {
+    BODY_MASS = body_mass;
+    BODY_INERTIA = body_inertia;
+    BODY_IPOS = body_ipos;
+    BODY_POS = body_pos;
+    DOF_DAMPING = dof_damping;
+    GEOM_FRICTION = geom_friction;
+    GEOM_SIZE = geom_size;
+}
+
+impl NumberArray {
+    /// Numbers of the array in the compiled model of `model` with the differences `patch`.
+    pub fn all(self, model: &Model, patch: Option<&ModelPatch>) -> Vec<f64> {
+        let mut numbers = (self.compiled)(model).to_vec();
+        if let Some(patch) = patch {
+            patch.overlay(self, 0, &mut numbers);
+        }
+        numbers
+    }
+
+    /// `K` numbers as in [`all`](Self::all), from index `first` on.
+    ///
+    /// # Panics
+    /// The array has fewer than `first + K` numbers.
+    pub fn some<const K: usize>(self, model: &Model, patch: Option<&ModelPatch>, first: usize) -> [f64; K] {
+        let mut numbers = [0.0; K];
+        numbers.copy_from_slice(&(self.compiled)(model)[first..first + K]);
+        if let Some(patch) = patch {
+            patch.overlay(self, first, &mut numbers);
+        }
+        numbers
+    }
+}
+
 impl ModelPatch {
     /// Gravity in world axes \[m/s²\].
     pub fn gravity(&self) -> [f64; 3] {
@@ -98,14 +156,22 @@ impl ModelPatch {
         2 * size_of::<usize>() + size_of::<Self>() + size_of_val(&*self.values) + layout.div_ceil(owners) + unwelded
     }
 
-    /// Calls `visit` for the numbers that the patch has of an array of `f64`, with their indices.
-    pub fn for_each_number(&self, array: &str, mut visit: impl FnMut(usize, f64)) {
-        self.for_each(|field, span, values| {
-            if field.array.name == array {
-                let first = span.at as usize;
-                values.iter().enumerate().for_each(|(k, value)| visit(first + k, f64::from_bits(*value)));
+    /// Replaces the numbers that the patch has of an array in `numbers`, a part of the array from index `first` on.
+    fn overlay(&self, array: NumberArray, first: usize, numbers: &mut [f64]) {
+        let Some(field) = self.layout.fields.iter().find(|field| field.array.name == array.name) else { return };
+        let mut values = &self.values[..];
+        for span in &self.layout.spans {
+            let (mine, rest) = values.split_at(span.words as usize);
+            values = rest;
+            if span.field != field.index {
+                continue;
             }
-        });
+            for (at, value) in (span.at as usize..).zip(mine) {
+                if let Some(number) = at.checked_sub(first).and_then(|k| numbers.get_mut(k)) {
+                    *number = f64::from_bits(*value);
+                }
+            }
+        }
     }
 
     /// Names and sizes \[bytes\] of the arrays with differences.
@@ -259,14 +325,15 @@ impl PatchWords {
         Some(Arc::new(ModelPatch { layout, values: self.values.into(), globals, welded }))
     }
 
-    /// Creates the patch as [`into_patch`](Self::into_patch) does, with the places of `last` if it has few others. Then
-    /// it has words that do not differ, too, which `read` returns.
+    /// Creates the patch as [`into_patch`](Self::into_patch) does, with the places of `last`, too, if they are few. Then
+    /// it has words that do not differ, which `read` returns.
     ///
     /// Numbers that differ by rounding alone, such as the constants of MuJoCo, are equal in some environments by
-    /// chance. The places of a draw therefore soon have all that ever differ, and environments share their list.
-    pub(super) fn into_patch_like(
-        mut self,
-        last: &Arc<PatchLayout>,
+    /// chance. The places of a draw therefore soon have all that ever differ, and environments share their list:
+    /// [`PatchValues`].
+    pub(super) fn into_patch_near(
+        self,
+        last: &PatchLayout,
         model: &Model,
         globals: Globals,
         read: impl Fn(&ModelArray, usize) -> u64,
@@ -276,22 +343,71 @@ impl PatchWords {
             return self.into_patch(model, globals);
         }
         let spans = last.merged_spans(&self.spans);
-        if 8 * word_count(&spans) > 9 * self.values.len() {
+        if !are_most(self.values.len(), word_count(&spans)) {
             return self.into_patch(model, globals);
         }
-        let layout = if spans[..] == last.spans[..] {
-            Arc::clone(last)
-        } else {
-            let storage = Arc::clone(model.storage());
-            Arc::new(PatchLayout { storage, fields: std::mem::take(&mut self.fields).into(), spans: spans.into() })
-        };
+        let storage = Arc::clone(model.storage());
+        let layout = PatchLayout { storage, fields: self.fields.into(), spans: spans.into() };
         let mut values = Vec::with_capacity(word_count(&layout.spans));
         layout.for_each_place(|array, places| values.extend(places.map(|at| read(array, at))));
-        Some(Arc::new(ModelPatch { layout, values: values.into(), globals, welded: None }))
+        Some(Arc::new(ModelPatch { layout: Arc::new(layout), values: values.into(), globals, welded: None }))
     }
 
     fn is_nominal(&self, model: &Model, globals: Globals) -> bool {
         self.spans.is_empty() && globals.bits() == Globals::of(model.compiled()).bits()
+    }
+}
+
+/// True if `differing` words are so many of `all` words of a list of places that a patch may have the list.
+fn are_most(differing: usize, all: usize) -> bool {
+    8 * all <= 9 * differing
+}
+
+/// Values of a patch with a given list of places, collected array by array.
+#[derive(Debug)]
+pub(super) struct PatchValues<'l> {
+    layout: &'l Arc<PatchLayout>,
+    /// Spans of arrays that are not collected yet.
+    spans: &'l [Span],
+    values: Vec<u64>,
+    /// Number of values that differ from those of the compiled model.
+    differing: usize,
+}
+
+impl<'l> PatchValues<'l> {
+    pub(super) fn new(layout: &'l Arc<PatchLayout>) -> Self {
+        let values = Vec::with_capacity(word_count(&layout.spans));
+        Self { layout, spans: &layout.spans, values, differing: 0 }
+    }
+
+    /// Adds the next array: its content, and that of the compiled model. `None` if they differ in a word outside of the
+    /// places, or in no word although the array has places.
+    pub(super) fn push(&mut self, field: &Field, mine: &[u8], compiled: &[u8]) -> Option<()> {
+        let (differing, mut end) = (self.differing, 0);
+        while let Some((span, rest)) = self.spans.split_first().filter(|(span, _)| span.field == field.index) {
+            let places = span.at as usize..(span.at + span.words) as usize;
+            if mine[end..8 * places.start] != compiled[end..8 * places.start] {
+                return None;
+            }
+            // The last word may have fewer bytes.
+            end = mine.len().min(8 * places.end);
+            for at in places {
+                let value = word(mine, at);
+                self.differing += usize::from(value != word(compiled, at));
+                self.values.push(value);
+            }
+            self.spans = rest;
+        }
+        let is_used = end == 0 || self.differing > differing;
+        (is_used && mine[end..] == compiled[end..]).then_some(())
+    }
+
+    /// The patch, after all arrays; `None` if too few of its values differ.
+    pub(super) fn into_patch(self, globals: Globals) -> Option<Arc<ModelPatch>> {
+        let Self { layout, values, differing, .. } = self;
+        let is_similar = differing > 0 && are_most(differing, values.len());
+        is_similar
+            .then(|| Arc::new(ModelPatch { layout: Arc::clone(layout), values: values.into(), globals, welded: None }))
     }
 }
 
@@ -499,6 +615,9 @@ mod tests {
             assert!(content(&model) == whole, "turn {turn}, kind {kind}");
             assert!(content(&editor.model(&base)) == whole, "turn {turn}, kind {kind}");
             assert_eq!(patch.is_none(), kind == 0, "kind {kind}");
+            // Without a model that has the patch.
+            assert_eq!(NumberArray::BODY_MASS.all(&base, patch.as_deref()), model.body_mass());
+            assert_eq!(NumberArray::GEOM_FRICTION.some(&base, patch.as_deref(), 2), model.geom_friction()[2..7]);
             differed += usize::from(whole != content(&base));
             // With a weld, and without it again.
             let weld = Weld { equality: 0, pose: [0.1, 0.2, 0.3, 0.8, 0.0, 0.6, 0.0] };

@@ -10,7 +10,8 @@ use crate::env::{EnvStats, EnvStatus};
 use crate::wrenches::Wrenches;
 use kinetoscope_mujoco as mj;
 use kinetoscope_mujoco::{
-    BodyInputs, Data, IntegrationState, JointInputs, Model, ModelPatch, SolvedState, UserInputs, WarningCounts, Weld,
+    BodyInputs, Data, IntegrationState, JointInputs, Model, ModelPatch, NumberArray, SolvedState, UserInputs,
+    WarningCounts, Weld,
 };
 use std::sync::Arc;
 
@@ -250,12 +251,9 @@ impl StoredRow<'_> {
         self.row.joint_inputs.ctrl(self.model)
     }
 
-    /// Model of the environment, with its properties: a new one unless they are nominal.
-    pub(crate) fn own_model(&self) -> Model {
-        match &self.row.patch {
-            None => self.model.without_patch(),
-            Some(patch) => self.model.clone().patched(patch),
-        }
+    /// Numbers of an array of the environment's model, from index `first` on.
+    pub(crate) fn model_numbers<const K: usize>(&self, array: NumberArray, first: usize) -> [f64; K] {
+        array.some(self.model, self.row.patch.as_deref(), first)
     }
 
     /// Gravity of the environment in world axes \[m/s²\].

@@ -1,7 +1,7 @@
 //! Mass properties, friction and damping of a rigid object in each environment at run time, and external wrenches.
 //!
-//! An environment whose object differs from the others gets a model of its own, which owns only the arrays that differ:
-//! see [`randomization`](crate::randomization), whose properties these are.
+//! An environment whose object differs from the others keeps the numbers in which its model differs: see
+//! [`randomization`](crate::randomization), whose properties these are.
 
 use crate::env::Stage;
 use crate::error::{Error, Result};
@@ -10,8 +10,9 @@ use crate::objects::rigid_object::{RigidObject, RigidObjectMut};
 use crate::objects::rigid_object_data::BodyType;
 use crate::objects::rows::{ArgumentSpec, EnvRows, unique_envs};
 use crate::randomization::Property;
+use crate::row::StoredRow;
 use crate::wrenches::{Wrench, WrenchFrame};
-use kinetoscope_mujoco::Model;
+use kinetoscope_mujoco::NumberArray;
 use nalgebra::{UnitQuaternion, Vector3};
 use ndarray::{Array1, Array2, ArrayView2, AsArray, Axis, Ix1, Ix2};
 
@@ -23,17 +24,14 @@ impl RigidObject<'_> {
     /// dynamic.
     #[doc(alias = "get_mass")]
     pub fn mass(&self) -> Array1<f64> {
-        let nominal = self.data.mass_properties().mass;
-        self.read_body_values(1, [nominal].into(), |model, body| model.body_mass()[body..=body].to_vec())
-            .remove_axis(Axis(1))
+        self.read_body_values(NumberArray::BODY_MASS, [self.data.mass_properties().mass]).remove_axis(Axis(1))
     }
 
     /// Center of mass in the object's frame in each environment \[m\], shape (N, 3). An object that is not dynamic has
     /// the configured one.
     #[doc(alias = "get_center_of_mass")]
     pub fn center_of_mass(&self) -> Array2<f64> {
-        let nominal = self.data.mass_properties().com.iter().copied().collect();
-        self.read_body_values(3, nominal, |model, body| model.body_ipos()[3 * body..3 * body + 3].to_vec())
+        self.read_body_values(NumberArray::BODY_IPOS, self.data.mass_properties().com.into())
     }
 
     /// Principal moments of inertia about the center of mass in each environment \[kg m²\], shape (N, 3), along x, y
@@ -41,38 +39,33 @@ impl RigidObject<'_> {
     /// largest first. An object that is not dynamic has the configured moments.
     #[doc(alias = "get_inertia")]
     pub fn inertia(&self) -> Array2<f64> {
-        let nominal = self.data.mass_properties().moments.iter().copied().collect();
-        self.read_body_values(3, nominal, |model, body| model.body_inertia()[3 * body..3 * body + 3].to_vec())
+        self.read_body_values(NumberArray::BODY_INERTIA, self.data.mass_properties().moments.into())
     }
 
     /// Sliding friction coefficient, torsional \[m\] and rolling \[m\] in each environment, shape (N, 3).
     #[doc(alias = "get_friction")]
     pub fn friction(&self) -> Array2<f64> {
-        let mut values = Array2::zeros((self.simulation.batch.num_envs(), 3));
+        let model = self.simulation.batch.model();
         let body = self.simulation.objects[self.index].body;
-        self.simulation.batch.for_each_row(|i, row| {
-            let model = row.own_model();
-            // The first geom is the collision shape.
-            if let Ok(geom) = usize::try_from(model.body_geomadr()[body]) {
-                (0..3).for_each(|k| values[(i, k)] = model.geom_friction()[3 * geom + k]);
-            }
-        });
-        values
+        // The first geom is the collision shape.
+        match usize::try_from(model.body_geomadr()[body]) {
+            Ok(geom) => self.read_values(|row| row.model_numbers::<3>(NumberArray::GEOM_FRICTION, 3 * geom)),
+            Err(_) => self.read_values(|_| [0.0; 3]),
+        }
     }
 
     /// Linear damping \[N s/m\] and angular damping \[N m s/rad\] in each environment, shape (N, 2); 0 for an object
     /// that is not dynamic.
     #[doc(alias = "get_damping")]
     pub fn damping(&self) -> Array2<f64> {
-        let mut values = Array2::zeros((self.simulation.batch.num_envs(), 2));
-        if let Some((_, dof)) = self.simulation.objects[self.index].free_joint {
-            self.simulation.batch.for_each_row(|i, row| {
-                let model = row.own_model();
-                let damping = model.dof_damping();
-                [damping[dof], damping[dof + 3]].into_iter().enumerate().for_each(|(k, value)| values[(i, k)] = value);
-            });
-        }
-        values
+        let Some((_, dof)) = self.simulation.objects[self.index].free_joint else {
+            return self.read_values(|_| [0.0; 2]);
+        };
+        self.read_values(|row| {
+            // Three numbers for translations, then three for rotations.
+            let [linear, _, _, angular] = row.model_numbers(NumberArray::DOF_DAMPING, dof);
+            [linear, angular]
+        })
     }
 
     /// Forces and torques of [`set_external_wrench`](RigidObjectMut::set_external_wrench), in world axes at the current
@@ -88,21 +81,18 @@ impl RigidObject<'_> {
         })
     }
 
-    /// Reads numbers of the body in each environment; returns `nominal` for an object that is not dynamic.
-    fn read_body_values(
-        &self,
-        width: usize,
-        nominal: Vec<f64>,
-        read: impl Fn(&Model, usize) -> Vec<f64>,
-    ) -> Array2<f64> {
+    /// Reads the `K` numbers of the body in each environment; returns `nominal` for an object that is not dynamic.
+    fn read_body_values<const K: usize>(&self, array: NumberArray, nominal: [f64; K]) -> Array2<f64> {
         let body = self.simulation.objects[self.index].body;
         let moves = self.cfg().body_type == BodyType::Dynamic;
-        let mut values = Array2::zeros((self.simulation.batch.num_envs(), width));
-        self.simulation.batch.for_each_row(|i, row| {
-            let numbers = if moves { read(&row.own_model(), body) } else { nominal.clone() };
-            numbers.into_iter().enumerate().for_each(|(k, value)| values[(i, k)] = value);
-        });
-        values
+        self.read_values(|row| if moves { row.model_numbers(array, K * body) } else { nominal })
+    }
+
+    /// Reads `K` numbers of each environment.
+    fn read_values<const K: usize>(&self, read: impl Fn(&StoredRow<'_>) -> [f64; K]) -> Array2<f64> {
+        let mut values = vec![[0.0; K]; self.simulation.batch.num_envs()];
+        self.simulation.batch.for_each_row(|i, row| values[i] = read(&row));
+        values.into()
     }
 }
 

@@ -73,11 +73,14 @@ pub enum RandomizationError {
         expected: usize,
     },
     /// The memory for the own values and models of all environments is not available.
-    #[error("properties of {envs} environments need {} MiB of memory, which is not available; choose fewer", bytes >> 20)]
+    #[error(
+        "properties of {envs} environments need more than {} MiB of memory, which is not available; choose fewer",
+        bytes >> 20
+    )]
     OutOfMemory {
         /// Number of environments to change.
         envs: usize,
-        /// Needed memory \[bytes\].
+        /// Memory of the changes up to the one that does not fit \[bytes\].
         bytes: usize,
     },
     /// The scene of an environment cannot be rendered.

@@ -127,6 +127,7 @@ impl Simulation {
     ) -> Result<PreparedChanges> {
         let mut properties = self.batch.read_row(0, |row| Properties::new(tables, &NO_OVERRIDES, &row.drives));
         let (mut made, mut others) = (Vec::with_capacity(envs.len()), Vec::new());
+        let mut memory = MemoryCheck::default();
         for &index in envs {
             self.batch.read_row(index, |row| -> Result<()> {
                 let before = &self.property_overrides[index];
@@ -143,10 +144,8 @@ impl Simulation {
                 if looks_other {
                     others.push((index, own));
                 }
-                if made.is_empty() {
-                    let bytes = size_of::<PreparedChange>() + stored.bytes() + patch.bytes();
-                    check_memory(envs.len(), bytes, available_memory())?;
-                }
+                let bytes = size_of::<PreparedChange>() + stored.bytes() + patch.bytes();
+                memory.add(envs.len(), bytes, available_memory)?;
                 made.push((index, stored, patch));
                 Ok(())
             })?;
@@ -225,12 +224,39 @@ type PreparedChange = (usize, StoredOverrides, EnvPatch);
 /// All prepared environments, and the own values of those whose sizes or colors change.
 type PreparedChanges = (Vec<PreparedChange>, Vec<(usize, PropertyOverrides)>);
 
-/// Checks that own values and models of `envs` environments fit in the available memory, if each of them takes `bytes`.
-fn check_memory(envs: usize, bytes: usize, available: Option<usize>) -> Result<(), RandomizationError> {
-    let bytes = bytes.saturating_mul(envs);
-    match available {
-        Some(available) if bytes > available => Err(RandomizationError::OutOfMemory { envs, bytes }),
-        _ => Ok(()),
+/// Memory of prepared changes, compared with the available memory.
+#[derive(Debug, Default)]
+struct MemoryCheck {
+    /// Sum of all changes so far \[bytes\].
+    bytes: usize,
+    /// Largest sum that fits. `None` if it is not known, or not read yet.
+    limit: Option<usize>,
+    is_limit_read: bool,
+}
+
+impl MemoryCheck {
+    /// Sum that is not checked \[bytes\]. To read the limit takes as long as the changes of several environments.
+    const UNCHECKED: usize = 16 << 20;
+    /// Header and padding of a block of the allocator, for each list of a change and for its patch.
+    const BLOCKS: usize = 16 * 6;
+
+    /// Adds a change of `bytes` to those that are in memory already, of `envs` environments in all. `available` returns
+    /// the memory that is still available, `None` if it is not known; it is called at most once.
+    fn add(
+        &mut self,
+        envs: usize,
+        bytes: usize,
+        available: impl FnOnce() -> Option<usize>,
+    ) -> Result<(), RandomizationError> {
+        self.bytes = self.bytes.saturating_add(bytes + Self::BLOCKS);
+        if self.bytes > Self::UNCHECKED && !self.is_limit_read {
+            self.is_limit_read = true;
+            self.limit = available().map(|available| self.bytes.saturating_add(available));
+        }
+        match self.limit {
+            Some(limit) if self.bytes > limit => Err(RandomizationError::OutOfMemory { envs, bytes: self.bytes }),
+            _ => Ok(()),
+        }
     }
 }
 
@@ -243,11 +269,19 @@ mod tests {
 
     #[test]
     fn memory() {
-        assert!(check_memory(1000, 2000, Some(2_000_000)).is_ok());
-        assert!(check_memory(1 << 20, usize::MAX / 2, None).is_ok());
-        let refused = check_memory(10_000_000, 2048, Some(16 << 30)).expect_err("19 GiB do not fit");
-        assert!(refused.to_string().contains("19531 MiB"), "{refused}");
-        assert!(check_memory(1000, 2001, Some(2_000_000)).is_err());
-        assert!(check_memory(usize::MAX, 2, Some(16 << 30)).is_err());
+        const MIB: usize = 1 << 20;
+        let change = |mib: usize| mib * MIB - MemoryCheck::BLOCKS;
+        // Environments differ: the sum counts, not the first one.
+        let mut check = MemoryCheck::default();
+        for mib in [1, 15] {
+            check.add(4, change(mib), || panic!("little memory is not checked")).expect("little");
+        }
+        // 17 MiB in use, 10 MiB available.
+        check.add(4, change(1), || Some(10 * MIB)).expect("fits");
+        check.add(4, change(10), || panic!("the limit is read once")).expect("fits exactly");
+        let refused = check.add(4, 0, || None).expect_err("96 bytes do not fit").to_string();
+        assert!(refused.contains("4 environments need more than 27 MiB"), "{refused}");
+        let mut unknown = MemoryCheck::default();
+        (0..3).for_each(|_| unknown.add(1 << 20, usize::MAX / 2, || None).expect("nothing is known"));
     }
 }

@@ -3,7 +3,7 @@
 use super::Property;
 use super::properties::PropertyOverrides;
 use super::tables::PropertyTables;
-use kinetoscope_mujoco::{Model, ModelPatch};
+use kinetoscope_mujoco::{Model, ModelPatch, NumberArray};
 
 /// Own property values of an environment. Values that its model has, such as masses, are not stored twice.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -33,9 +33,9 @@ impl StoredOverrides {
         for property in Property::ALL {
             let Some(mine) = &own[property as usize] else { continue };
             all |= bit(property);
-            let of_model = values_of_model(property, tables, model, patch);
-            let bits = |values: &[f64]| values.iter().map(|x| x.to_bits()).collect::<Vec<_>>();
-            if of_model.is_none_or(|of_model| bits(&of_model) != bits(mine)) {
+            let is_of_model = values_of_model(property, tables, model, patch)
+                .is_some_and(|of_model| of_model.iter().map(|x| x.to_bits()).eq(mine.iter().map(|x| x.to_bits())));
+            if !is_of_model {
                 stored |= bit(property);
                 values.extend_from_slice(mine);
             }
@@ -96,21 +96,18 @@ fn values_of_model(
         return Some(patch.map_or(model.gravity(), ModelPatch::gravity).into());
     }
     // The array, its width, and the index of the first number of the property.
-    let (array, compiled, width, first) = match property {
-        Property::Mass => ("body_mass", model.body_mass(), 1, 0),
-        Property::CenterOfMass => ("body_ipos", model.body_ipos(), 3, 0),
-        Property::Inertia => ("body_inertia", model.body_inertia(), 3, 0),
-        Property::Friction => ("geom_friction", model.geom_friction(), 3, 0),
-        Property::TorsionalFriction => ("geom_friction", model.geom_friction(), 3, 1),
-        Property::RollingFriction => ("geom_friction", model.geom_friction(), 3, 2),
-        Property::Size => ("geom_size", model.geom_size(), 3, 0),
-        Property::Position => ("body_pos", model.body_pos(), 3, 0),
+    let (array, width, first) = match property {
+        Property::Mass => (NumberArray::BODY_MASS, 1, 0),
+        Property::CenterOfMass => (NumberArray::BODY_IPOS, 3, 0),
+        Property::Inertia => (NumberArray::BODY_INERTIA, 3, 0),
+        Property::Friction => (NumberArray::GEOM_FRICTION, 3, 0),
+        Property::TorsionalFriction => (NumberArray::GEOM_FRICTION, 3, 1),
+        Property::RollingFriction => (NumberArray::GEOM_FRICTION, 3, 2),
+        Property::Size => (NumberArray::GEOM_SIZE, 3, 0),
+        Property::Position => (NumberArray::BODY_POS, 3, 0),
         _ => return None,
     };
-    let mut numbers = compiled.to_vec();
-    if let Some(patch) = patch {
-        patch.for_each_number(array, |index, number| numbers[index] = number);
-    }
+    let numbers = array.all(model, patch);
     let places = tables.get(property).indices.iter();
     Some(
         places
