@@ -230,8 +230,8 @@ class SceneCapture:
             return 0.5 * (float(getattr(left, field, 0.0)) + float(getattr(right, field, 0.0)))
 
         vectors = [0.5 * (getattr(left, field) + getattr(right, field)) for field in ("pos", "forward", "up")]
-        names = ("frustum_center", "frustum_width", "frustum_bottom", "frustum_top", "frustum_near", "frustum_far")
-        frustum, fog, scale = [mean(name) for name in names], self._fog, 1.0
+        lengths = ("frustum_center", "frustum_width", "frustum_bottom", "frustum_top", "frustum_near", "frustum_far")
+        frustum, fog, scale = [mean(length) for length in lengths], self._fog, 1.0
         room = RoomTransform.of(scene)
         if room is not None:
             position, *directions = vectors
