@@ -22,8 +22,10 @@ pub struct RasterCfg {
     /// scene: one ray from each sample on a mirror, shaded at its hit. In MuJoCo's light model, only the first mirror
     /// of the scene reflects. Path tracing always reflects.
     pub reflections: bool,
-    /// Texels along the side of a shadow map, for the renderers with shadow maps (see [`shadows`](Self::shadows)); 0
-    /// selects 128 to 1024 by the image size. Other values are clamped to 64..=8192 and rounded up to a multiple of 8.
+    /// Texels along the side of a shadow map, for the renderers with shadow maps (see [`shadows`](Self::shadows)). 0
+    /// selects 128 to 1024 by the image size, or 512 to 2048 for scenes in MuJoCo's look, such as those of the Python
+    /// package `kinetoscope-render`, whose shadows have sharp edges. Other values are clamped to 64..=8192 and rounded up
+    /// to a multiple of 8.
     pub shadow_size: usize,
     /// Rays per color sample for ambient occlusion, in [`Renderer::Hybrid`](crate::renderer::Renderer::Hybrid) only; 0
     /// disables it. Path tracing ignores this number; with the other renderers, a number above 0 is an error. With
@@ -51,6 +53,10 @@ pub struct RasterCfg {
     ///   arbitrary on features smaller than half a pixel or 1 mm. Shading normals are interpolated from normals of the
     ///   mesh's own vertices, and no new triangle faces more than 40° away from them;
     /// - shadow maps follow the same rule in texels.
+    ///
+    /// Scenes in MuJoCo's look, such as those of the Python package `kinetoscope-render`, are compared with images at full
+    /// detail: the limit in their images is a tenth of a pixel instead of half a pixel. Their shadow maps follow the rule of
+    /// other scenes.
     ///
     /// The level depends only on the mesh, its pose and the view. Terrain is rendered at full detail. So are meshes
     /// with fewer than 1000 triangles, with texture coordinates, or that reach behind the near plane. The levels of a

@@ -115,6 +115,7 @@ pub struct RenderScene {
     texture_scales: Vec<[f32; 3]>,
     texture_offsets: Vec<[f32; 2]>,
     plane_lines: Vec<[PlaneLines; 2]>,
+    face_images: Vec<Option<[f32; 2]>>,
     /// Lights of the scene, used if the renderer is given no others. Renderers use the first 16 active lights.
     pub lights: Vec<Light>,
     /// Headlight of every camera.
@@ -204,7 +205,17 @@ impl RenderScene {
         let linear_colors = instances.iter().map(linear).collect();
         let (texture_scales, texture_offsets) = instances.iter().map(Instance::texture_map).unzip();
         let plane_lines = vec![[PlaneLines::default(); 2]; instances.len()];
-        Ok(Self { linear_colors, texture_scales, texture_offsets, plane_lines, instances, first_ids, ..Self::empty() })
+        let face_images = vec![None; instances.len()];
+        Ok(Self {
+            linear_colors,
+            texture_scales,
+            texture_offsets,
+            plane_lines,
+            face_images,
+            instances,
+            first_ids,
+            ..Self::empty()
+        })
     }
 
     /// Creates a scene of other instances with the lights and the background of this one.
@@ -226,6 +237,7 @@ impl RenderScene {
             texture_scales: Vec::new(),
             texture_offsets: Vec::new(),
             plane_lines: Vec::new(),
+            face_images: Vec::new(),
             instances: Vec::new(),
             first_ids: vec![0],
             lights: vec![Light::default()],
@@ -253,6 +265,24 @@ impl RenderScene {
     /// Polygons of each instance that is a plane, see [`set_plane_lines`](Self::set_plane_lines).
     pub fn plane_lines(&self) -> &[[PlaneLines; 2]] {
         &self.plane_lines
+    }
+
+    /// Puts the two-dimensional texture of an instance that is a box on each of its faces, as MuJoCo's OpenGL renderer does
+    /// from 3.12 on, instead of projecting it along z. `images` are the repetitions of the texture across and along a face,
+    /// see [`Box::face_coordinates`](crate::shape::Box::face_coordinates).
+    ///
+    /// # Panics
+    ///
+    /// `index` is out of range.
+    #[track_caller]
+    pub fn set_face_images(&mut self, index: usize, images: [f32; 2]) {
+        self.face_images[index] = Some(images);
+    }
+
+    /// Repetitions of the texture on the faces of each instance, see [`set_face_images`](Self::set_face_images); `None` for
+    /// a texture that is projected, or has texture coordinates of its own.
+    pub fn face_images(&self) -> &[Option<[f32; 2]>] {
+        &self.face_images
     }
 
     /// Replaces the shape of an instance by one of the same kind, and shows or hides the instance. Sizes are not

@@ -344,9 +344,13 @@ impl<M: VisualModel> MjvReader<M> {
                 Some((index, self.plane_grid(&looks[row.geom as usize], memory).lines(plane)))
             })
             .collect();
+        let faces = self.face_images(&instances, &rows, &looks);
         let scaled = |mut scene: RenderScene| {
             for &(instance, scale) in &scales {
                 scene.set_texture_scale(instance, scale);
+            }
+            for &(instance, images) in &faces {
+                scene.set_face_images(instance, images);
             }
             for &(instance, lines) in &grids {
                 scene.set_plane_lines(instance, lines);
@@ -426,6 +430,19 @@ impl<M: VisualModel> MjvReader<M> {
             },
             None => Instance { visible: false, ..instance },
         }
+    }
+
+    /// Repetitions of two-dimensional textures on the faces of boxes, for [`TextureRule::Wrapped`].
+    fn face_images(&self, instances: &[Instance], rows: &[InstanceRow], looks: &[GeomLook]) -> Vec<(usize, [f32; 2])> {
+        let is_wrapped = self.texture_rule == TextureRule::Wrapped;
+        let images = |(index, (instance, row)): (usize, (&Instance, &InstanceRow))| {
+            let material = &instance.material;
+            let is_flat = material.texture.as_ref().is_some_and(|texture| texture.kind() == TextureKind::TwoD);
+            let is_wrapped = is_wrapped && is_flat && matches!(instance.shape, Shape::Box(_));
+            let look = &looks[row.geom as usize];
+            is_wrapped.then(|| (index, images_along(look, material.tex_repeat, material.tex_uniform)))
+        };
+        instances.iter().zip(rows).enumerate().filter_map(images).collect()
     }
 
     /// Scales of cube textures where they are not those of [`RenderScene`]: in OpenGL, the texture of a mesh is on a cube
@@ -513,10 +530,9 @@ impl<M: VisualModel> MjvReader<M> {
         let [emission, specular, shininess, reflectance] = look.shading.map(f32::from_bits);
         // MuJoCo reflects the scene in planes and in the upper face of boxes only.
         let mirrors = matches!(GeomType::from_id(look.kind), Some(GeomType::Plane | GeomType::Box));
-        let is_mirror = mirrors && reflectance > 0.0;
         let (shape, texture) = match texture {
             Some(texture) if texture.kind() == TextureKind::TwoD => {
-                self.mapped(look, shape, texture, is_mirror, (tex_repeat, tex_uniform))
+                self.mapped(look, shape, texture, (tex_repeat, tex_uniform))
             }
             texture => (shape, texture),
         };
@@ -554,20 +570,16 @@ impl<M: VisualModel> MjvReader<M> {
         Ok(instance)
     }
 
-    /// Shape and texture such that the texture has the place of MuJoCo's renderer. Boxes that are mirrors stay as they
-    /// are, because meshes do not mirror.
+    /// Shape and texture such that the texture has the place of MuJoCo's renderer. Boxes stay as they are, see
+    /// [`face_images`](Self::face_images): a mesh would be a little behind or in front of a box at the same place.
     fn mapped(
         &mut self,
         look: &GeomLook,
         shape: Shape,
         texture: Arc<Texture>,
-        is_mirror: bool,
         (repeat, is_uniform): ([f32; 2], bool),
     ) -> (Shape, Option<Arc<Texture>>) {
-        let repeat = repeat.map(|r| if r > 0.0 { r } else { 1.0 });
-        let size = look.size.map(f32::from_bits);
-        let of_size = |k: usize| repeat[k] * if is_uniform && size[k] > 0.0 { size[k] } else { 1.0 };
-        let scale = [of_size(0), of_size(1)];
+        let scale = images_along(look, repeat, is_uniform);
         match (self.texture_rule, &shape) {
             (TextureRule::Projected, Shape::Plane(plane)) => {
                 let Some(shift) = plane_shift(plane, scale.map(|images| 0.5 * images), &texture) else {
@@ -581,7 +593,7 @@ impl<M: VisualModel> MjvReader<M> {
                 }
                 (shape, moved.or(Some(texture)))
             }
-            (TextureRule::Wrapped, _) if !is_mirror && look.soft.is_none() => {
+            (TextureRule::Wrapped, _) if look.soft.is_none() => {
                 if self.wrapped.len() > MAX_WRAPPED {
                     self.wrapped.clear();
                 }
@@ -657,6 +669,14 @@ impl<M: VisualModel> MjvReader<M> {
             self.omitted.push(message);
         }
     }
+}
+
+/// Images of a texture along both of its axes, with these repetitions of its material; with `is_uniform`, they are those
+/// along half the first two sizes of the geom.
+fn images_along(look: &GeomLook, repeat: [f32; 2], is_uniform: bool) -> [f32; 2] {
+    let size = look.size.map(f32::from_bits);
+    let repeat = repeat.map(|r| if r > 0.0 { r } else { 1.0 });
+    [0, 1].map(|k| repeat[k] * if is_uniform && size[k] > 0.0 { size[k] } else { 1.0 })
 }
 
 /// Shape of a geom whose sizes define it; `None` for other types.

@@ -20,9 +20,9 @@ pub enum TextureRule {
 const SLICES: usize = 64;
 const STACKS: usize = SLICES / 2;
 
-/// A mesh of a round shape or a box with the texture coordinates of [`TextureRule::Wrapped`] times `scale`, or a mesh
-/// with its own texture coordinates times `scale`; `None` for other shapes, for meshes without texture coordinates, and
-/// for meshes whose scale is 1.
+/// A mesh of a round shape with the texture coordinates of [`TextureRule::Wrapped`] times `scale`, or a mesh with its own
+/// texture coordinates times `scale`; `None` for other shapes, for meshes without texture coordinates, and for meshes
+/// whose scale is 1.
 pub(super) fn wrapped_mesh(shape: &Shape, scale: [f32; 2]) -> Option<RenderMesh> {
     if let Shape::Mesh(mesh) = shape {
         return scaled_mesh(&mesh.mesh, scale);
@@ -57,24 +57,6 @@ pub(super) fn wrapped_mesh(shape: &Shape, scale: [f32; 2]) -> Option<RenderMesh>
                     let [x, y] = circle(s, if side > 0.0 { t } else { 1.0 - t });
                     ([radius * x, radius * y, side * half], [0.5 + 0.5 * x, 0.5 + 0.5 * y])
                 });
-            }
-        }
-        Shape::Box(cuboid) => {
-            let half = cuboid.half.map(f64::from);
-            // Axes of the texture, and the axis of the normal.
-            for (right, down, normal) in [(0, 1, 2), (1, 2, 0), (0, 2, 1)] {
-                for side in [1.0, -1.0] {
-                    // Seen from outside, the texture of one of two opposite faces is mirrored.
-                    let mirrored = (normal == 1) == (side > 0.0);
-                    grid.add([1, 1], |s, t| {
-                        let u = if mirrored { 1.0 - s } else { s };
-                        let mut at = [0.0; 3];
-                        at[right] = (2.0 * u - 1.0) * half[right];
-                        at[down] = (1.0 - 2.0 * t) * half[down];
-                        at[normal] = side * half[normal];
-                        (at, [u, t])
-                    });
-                }
             }
         }
         _ => return None,
@@ -181,12 +163,11 @@ mod tests {
     #[test]
     fn wrapped_coordinates() {
         let scale = [1.5f32, 2.0];
-        let shapes: [Shape; 5] = [
+        let shapes: [Shape; 4] = [
             Sphere { radius: 0.4 }.into(),
             Ellipsoid { radii: [0.5, 0.3, 0.4] }.into(),
             Capsule { radius: 0.2, half_length: 0.3 }.into(),
             Cylinder { radius: 0.3, half_length: 0.4 }.into(),
-            Box { half: [0.5, 0.3, 0.4] }.into(),
         ];
         for shape in &shapes {
             let mesh = wrapped_mesh(shape, scale).expect("a mesh");
@@ -213,11 +194,6 @@ mod tests {
                     }
                     Shape::Cylinder(_) if normal[2].abs() > 0.9 => [0.5 + 0.5 * x, 0.5 + 0.5 * y],
                     Shape::Cylinder(_) => [longitude, 0.5 - 0.5 * z],
-                    Shape::Box(_) => {
-                        let across = if normal[0].abs() > 0.9 { y } else { x };
-                        let down = if normal[2].abs() > 0.9 { y } else { z };
-                        [0.5 + 0.5 * across, 0.5 - 0.5 * down]
-                    }
                     _ => [longitude, 0.5 - latitude(z)],
                 };
                 let found = [uv[0] / scale[0], (1.0 - uv[1]) / scale[1]];
@@ -231,7 +207,9 @@ mod tests {
             }
             assert!((0..3).all(|k| (low[k] + high[k]).abs() < 1e-6));
         }
-        assert!(wrapped_mesh(&Plane { half: [1.0; 2] }.into(), scale).is_none());
+        for flat in [Shape::from(Plane { half: [1.0; 2] }), Box { half: [1.0; 3] }.into()] {
+            assert!(wrapped_mesh(&flat, scale).is_none());
+        }
     }
 
     /// Texture coordinates of a mesh are scaled from the upper left corner of the image, and nothing else changes.

@@ -33,6 +33,7 @@ class FrameList:
         options: list[float],
         effects: list[bool],
         size: list[int],
+        scale: float = 1.0,
         soft: tuple[list[npt.NDArray[np.float32]], list[npt.NDArray[np.int32]]] | None = None,
     ) -> None: ...
     def render(

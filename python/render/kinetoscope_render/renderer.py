@@ -128,8 +128,8 @@ class Renderer:
 
         Raises:
             RuntimeError: The renderer is closed, or another thread uses it.
-            ValueError: `out` has another shape.
-            NotImplementedError: The scene has a transform (`scene.enabletransform`).
+            ValueError: `out` has another shape, or the transform of the scene (`scene.enabletransform`) has no positive
+                scale or no unit quaternion.
         """
         capture = self._open()
         size = (self._height, self._width)

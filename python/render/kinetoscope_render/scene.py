@@ -15,6 +15,7 @@ from kinetoscope_render import _render
 from kinetoscope_render.flag_colors import FlagColors
 from kinetoscope_render.layout import layouts, scene_memory
 from kinetoscope_render.model import model_arrays
+from kinetoscope_render.room import RoomTransform
 
 _FLAGS = {name: int(value) for name, value in mujoco.mjtRndFlag.__members__.items()}
 # Arrays of a state whose lengths are compared with those of the model.
@@ -205,11 +206,9 @@ class SceneCapture:
         """Adds the scene, as it is now, to the frames: two frames of half the width for a stereo pair.
 
         Raises:
-            NotImplementedError: The scene has a transform.
+            ValueError: The transform of the scene is not a rotation, a translation and a positive scale.
         """
         scene = self.scene
-        if scene.enabletransform:
-            raise NotImplementedError("scene.enabletransform is not supported")
         left, right = scene.camera
         self._colors = FlagColors(scene)
         # Stereo of windows (mjSTEREO_QUADBUFFERED) is side by side in images.
@@ -231,16 +230,24 @@ class SceneCapture:
             return 0.5 * (float(getattr(left, field, 0.0)) + float(getattr(right, field, 0.0)))
 
         vectors = [0.5 * (getattr(left, field) + getattr(right, field)) for field in ("pos", "forward", "up")]
-        far = mean("frustum_far")
-        frustum = ("frustum_center", "frustum_width", "frustum_bottom", "frustum_top", "frustum_near")
-        camera = [*np.concatenate(vectors).tolist(), *map(mean, frustum), far, orthographic, self._line_width]
+        lengths = ("frustum_center", "frustum_width", "frustum_bottom", "frustum_top", "frustum_near", "frustum_far")
+        frustum, fog, scale = [mean(length) for length in lengths], self._fog, 1.0
+        room = RoomTransform.of(scene)
+        if room is not None:
+            position, *directions = vectors
+            vectors = [room.position_in_model(position), *map(room.direction_in_model, directions)]
+            scale = room.scale
+            frustum = [length / scale for length in frustum]
+            fog = [*fog[:3], *(distance / scale for distance in fog[3:])]
+        far = frustum[-1]
+        camera = [*np.concatenate(vectors).tolist(), *frustum, orthographic, self._line_width]
         on = [float(flags[_FLAGS[name]]) for name in ("mjRND_SKYBOX", "mjRND_HAZE", "mjRND_FOG")]
         names = ("mjRND_SHADOW", "mjRND_REFLECTION", "mjRND_CULL_FACE", "mjRND_ADDITIVE", "mjRND_WIREFRAME")
         effects = [bool(flags[_FLAGS[name]]) for name in names]
         effects[0] = effects[0] and self._has_shadows
         self.frames.capture(
-            self._geoms[: scene.ngeom], self._lights[: scene.nlight], camera, [*on, *self._haze, *self._fog, far],
-            effects, [width, height], self._soft(),
+            self._geoms[: scene.ngeom], self._lights[: scene.nlight], camera, [*on, *self._haze, *fog, far], effects,
+            [width, height], scale, self._soft(),
         )
 
     def render(

@@ -67,6 +67,8 @@ struct CapturedFrame {
     content: MjvFrame,
     view: View,
     effects: Effects,
+    /// Meters of depth per meter of the scene, which may be transformed.
+    scale: f32,
 }
 
 /// Effects that a frame may switch off.
@@ -172,8 +174,9 @@ impl FrameList {
     /// Captures a scene: the memory of its geoms (N, stride) and lights (L, stride), its camera (position, forward, up,
     /// center, half width, bottom, top, near, far, 1 if it is orthographic, width of lines \[pixels\]), its visual
     /// options, its flags (shadows, reflections, culled backs, added transparent geoms, wireframe), the size of the image
-    /// (width, height) \[pixels\], and the vertices of its skins and flexes.
-    #[pyo3(signature = (geoms, lights, camera, options, effects, size, soft=None))]
+    /// (width, height) \[pixels\], the meters of depth and of the attenuation of lights per meter of all other lengths, and
+    /// the vertices of its skins and flexes.
+    #[pyo3(signature = (geoms, lights, camera, options, effects, size, scale=1.0, soft=None))]
     #[expect(clippy::too_many_arguments, reason = "an internal function of the package")]
     fn capture(
         &mut self,
@@ -183,6 +186,7 @@ impl FrameList {
         options: [f64; 13],
         effects: [bool; 5],
         size: [usize; 2],
+        scale: f32,
         soft: Option<SoftArrays<'_>>,
     ) -> PyResult<()> {
         catch(|| {
@@ -235,8 +239,12 @@ impl FrameList {
                     ..memory
                 };
             }
-            let content = self.reader.read(&memory, background).map_err(invalid)?;
-            self.frames.push(CapturedFrame { content, view, effects: Effects { shadows, reflections } });
+            let mut content = self.reader.read(&memory, background).map_err(invalid)?;
+            for light in &mut content.lights {
+                let [constant, linear, quadratic] = light.attenuation;
+                light.attenuation = [constant, linear * scale, quadratic * scale * scale];
+            }
+            self.frames.push(CapturedFrame { content, view, effects: Effects { shadows, reflections }, scale });
             Ok(())
         })
     }
@@ -434,6 +442,9 @@ impl FrameList {
             renderer.render(&mut jobs).map_err(failure)?;
             for (frame, (_, buffers)) in frames.iter().zip(&mut jobs) {
                 buffers.replace_misses(frame.view.far);
+                if frame.scale != 1.0 {
+                    buffers.depth.iter_mut().flat_map(|depth| depth.iter_mut()).for_each(|depth| *depth *= frame.scale);
+                }
             }
         }
         if let Some(rgb) = &mut images.rgb {

@@ -126,18 +126,6 @@ def test_invalid_arguments(shapes):
             renderer.update_scene(data, camera)
 
 
-def test_unsupported_state_of_scenes(shapes):
-    """A field of the scene that changes MuJoCo's images is refused, not ignored."""
-    model, data = shapes
-    renderer = kr.Renderer(model, 10, 10)
-    renderer.update_scene(data)
-    renderer.scene.enabletransform = 1
-    with pytest.raises(NotImplementedError, match="scene.enabletransform"):
-        renderer.render()
-    renderer.scene.enabletransform = 0
-    renderer.render()
-
-
 def test_states_of_other_models():
     """A state of a model with fewer lights, tendons or joints has shorter arrays than the visualizer reads."""
     xml = """<mujoco><worldbody>{}<body>{}<geom size=".1"/><site name="s"/></body><body pos="1 0 0"><geom size=".1"/>

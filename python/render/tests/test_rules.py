@@ -172,6 +172,22 @@ def test_uniform_cube_textures(shape):
     check("texuniform", theirs.rgb, found.rgb, ours(*world(asset=asset.format(""), more=geom)), 33)
 
 
+@pytest.mark.parametrize("is_later", [True, False], ids=["later", "earlier"])
+def test_textured_boxes_at_one_place(is_later):
+    """Of two boxes at one place, the later one is visible everywhere, whether it has a texture or not.
+
+    Regression: boxes with a texture were meshes, through which the other box shone in some pixels.
+    """
+    asset = """<texture name="t" type="2d" builtin="checker" rgb1="1 1 1" rgb2="0 0 .5" mark="edge" markrgb="1 0 0"
+        width="64" height="64"/><material name="t" texture="t" texrepeat="2 1"/>"""
+    place = 'type="box" size=".4 .3 .2" pos=".1 -.7 .63" euler="13 31 47"'
+    painted, plain = f'<geom {place} material="t"/>', f'<geom {place} rgba=".1 .7 .2 1"/>'
+    boxes = [plain, painted] if is_later else [painted, plain]
+    theirs, found = pair(*world(asset=asset, more="".join(boxes)))
+    assert (theirs.ids == found.ids).all(-1)[inside(theirs.ids)].mean() >= 0.999
+    check("boxes", theirs.rgb, found.rgb, ours(*world(asset=asset, more="".join(boxes[::-1]))), 33)
+
+
 def test_number_of_lights():
     """OpenGL draws eight lights, the headlight included."""
     spots = [

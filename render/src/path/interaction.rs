@@ -86,6 +86,10 @@ fn texture(
     }
     let offset = scene.texture_offsets()[index].map(f64::from);
     let projected = ([0, 1].map(|k| local[k] * by[k] + offset[k]), by[0].abs().max(by[1].abs()));
-    let (at, density) = uv.unwrap_or(projected);
+    let on_faces = match (&instance.shape, scene.face_images()[index]) {
+        (Shape::Box(cuboid), Some(images)) => Some(cuboid.face_coordinates(local, images)),
+        _ => None,
+    };
+    let (at, density) = uv.or(on_faces).unwrap_or(projected);
     texel::at(image, at, width * density)
 }

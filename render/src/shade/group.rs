@@ -55,6 +55,7 @@ impl<'a> ShadingContext<'a> {
             color: self.shade.scene.linear_colors()[index],
             texture_scale: self.shade.scene.texture_scales()[index],
             texture_offset: self.shade.scene.texture_offsets()[index],
+            face_images: self.shade.scene.face_images()[index],
             plane_lines: self.shade.scene.plane_lines()[index],
         }
     }

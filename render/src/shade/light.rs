@@ -8,6 +8,7 @@ use super::surface::{InstanceSurface, Surface};
 use super::texture::{self, MipRule};
 use super::tone::{self, BlendSpace};
 use crate::simd::{F, M, Simd, V3, abs, max, min, select, splat, sqrt_or_zero};
+use kinetoscope_scene::shape::Shape;
 use kinetoscope_scene::vector::norm;
 use kinetoscope_scene::{Light, LightKind, LightingSpace, Material, OpenGlRules, RenderScene, Texture};
 use std::sync::Arc;
@@ -692,6 +693,8 @@ fn texels<S: Simd>(
         let has_uvs = instance.mesh().is_some_and(|m| m.uvs().is_some());
         let (uv, density) = if has_uvs {
             (at.uv, at.uv_density)
+        } else if let (Shape::Box(cuboid), Some(images)) = (&instance.shape, source.face_images) {
+            texture::on_box_faces(s, cuboid, images, at.local_position)
         } else {
             let offset = source.texture_offset;
             let uv = [at.local_position.x * scale[0] + offset[0], at.local_position.y * scale[1] + offset[1]];

@@ -56,6 +56,8 @@ pub(crate) struct InstanceSurface<'a> {
     pub(crate) texture_scale: [f32; 3],
     /// Texture coordinates at the origin, see [`kinetoscope_scene::RenderScene::texture_offsets`].
     pub(crate) texture_offset: [f32; 2],
+    /// Repetitions of the texture on the faces of a box, see [`kinetoscope_scene::RenderScene::face_images`].
+    pub(crate) face_images: Option<[f32; 2]>,
     /// Polygons of a plane, see [`kinetoscope_scene::RenderScene::plane_lines`].
     pub(crate) plane_lines: [PlaneLines; 2],
 }

@@ -7,6 +7,7 @@
 //! averaged in linear light.
 
 use crate::simd::{F, LANES, M, Simd, V3, abs, halves, max, min, select, select_i, splat, splat_i};
+use kinetoscope_scene::shape::Box;
 use kinetoscope_scene::{LightingSpace, MipLevel, RenderScene, Texture, TextureKind};
 
 /// Adding and subtracting this rounds to an integer (below 2^22).
@@ -139,6 +140,22 @@ pub(crate) fn face_footprint<S: Simd>(s: S, d: V3<S>, scale: [f32; 3], width: F<
     width * across / max(major, splat(s, 1e-6))
 }
 
+/// Texture coordinates on the faces of a box, and their number per meter: [`Box::face_coordinates`] for sixteen points.
+#[inline(always)]
+pub(crate) fn on_box_faces<S: Simd>(s: S, cuboid: &Box, images: [f32; 2], p: V3<S>) -> ([F<S>; 2], F<S>) {
+    let half = cuboid.half;
+    let (x, y, z) = (p.x * (1.0 / half[0]), p.y * (1.0 / half[1]), p.z * (1.0 / half[2]));
+    let (ax, ay, az) = (abs(x), abs(y), abs(z));
+    let by_x = ax.simd_ge(ay) & ax.simd_ge(az);
+    let by_y = !by_x & ay.simd_ge(az);
+    // The axes of `Box::FACE_AXES`.
+    let (across, along) = (select(by_x, y, x), select(by_x | by_y, z, y));
+    let per_meter = Box::FACE_AXES
+        .map(|[across, along]| splat(s, ((images[0] * images[1]).abs() / (4.0 * half[across] * half[along])).sqrt()));
+    let density = select(by_x, per_meter[0], select(by_y, per_meter[1], per_meter[2]));
+    ([(across * 0.5 + 0.5) * images[0], 1.0 - (0.5 - along * 0.5) * images[1]], density)
+}
+
 /// Interpolates the colors of `at` between the mip levels for pixels `texels` wide.
 ///
 /// Neighboring pixels use the same two or three levels, so the loop is over levels, whose sizes all lanes share.
@@ -235,4 +252,42 @@ fn wrap<S: Simd>(s: S, i: F<S>, n: f32) -> F<S> {
 /// True for a cube texture.
 pub(crate) fn is_cube(texture: &Texture) -> bool {
     texture.kind() == TextureKind::Cube
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::TestRng;
+    use crate::simd::{all_levels, at_level, load};
+
+    /// Coordinates on the faces of a box of sixteen points are those of [`Box::face_coordinates`].
+    #[test]
+    fn faces_of_boxes() {
+        let mut rng = TestRng(7);
+        for _ in 0..100 {
+            let cuboid = Box { half: rng.point(0.5).map(|x| 0.6 + x as f32) };
+            let images = [2.5f32, 1.5];
+            let mut points = [[0.0f32; 3]; LANES];
+            for (k, point) in points.iter_mut().enumerate() {
+                // Well inside of a face: at an edge, rounding decides on the face.
+                *point = rng.point(1.0).map(|x| 0.9 * x as f32);
+                point[k % 3] = if k % 2 == 0 { 1.0 } else { -1.0 };
+                *point = [0, 1, 2].map(|axis| point[axis] * cuboid.half[axis]);
+            }
+            let axes: [[f32; LANES]; 3] = std::array::from_fn(|axis| points.map(|point| point[axis]));
+            for level in all_levels() {
+                at_level!(level, s => {
+                    let [x, y, z] = axes.each_ref().map(|axis| load(s, axis));
+                    let ([u, v], density) = on_box_faces(s, &cuboid, images, V3 { x, y, z });
+                    let (u, v, density) = (u.array(), v.array(), density.array());
+                    for (k, point) in points.iter().enumerate() {
+                        let (uv, expected) = cuboid.face_coordinates(point.map(f64::from), images);
+                        let found = [u[k], v[k], density[k]].map(f64::from);
+                        let off = [found[0] - uv[0], found[1] - uv[1], found[2] / expected - 1.0];
+                        assert!(off.iter().all(|x| x.abs() < 1e-5), "{point:?} {found:?} {uv:?} {expected}");
+                    }
+                });
+            }
+        }
+    }
 }

@@ -354,3 +354,49 @@ fn corners_of_meshes() {
     assert!(a.iter().zip(&b).all(|(a, b)| a.abs_diff(*b) <= 1), "{a:?} {b:?}");
     assert!(a.iter().zip(&control).any(|(a, c)| a.abs_diff(*c) > 8), "the control: other polygons");
 }
+
+/// Each face of a box shows a whole image, and the box has the depth and the id of a box without a texture: of two boxes at
+/// one place, the later one is visible, as in OpenGL.
+///
+/// Regression: boxes with a texture were meshes, through which a box at the same place shone in some pixels.
+#[test]
+fn images_on_faces() {
+    // Two columns and two rows: red is 250, 150 above, 100, 50 below.
+    let pixels: Vec<u8> = [250, 150, 100, 50].into_iter().flat_map(|byte| [byte; 3]).collect();
+    let texture = Texture::averaged_in(LightingSpace::Display, TextureKind::TwoD, 2, 2, 3, &pixels).unwrap();
+    let painted = Material { texture: Some(Arc::new(texture)), emission: 1.0, ..matte([1.0; 3]) };
+    let half = [0.8, 0.4, 0.6];
+    let from = |eye: [f32; 3], up: [f32; 3]| View::look_at([SIZE; 2], 0.5, eye, [0.0; 3], up).unwrap();
+    let cuboid = |material: Material| (Shape::from(Box { half }), material, PoseF32::IDENTITY);
+    let draw = |boxes: Vec<(Shape, Material, PoseF32)>, index: usize, view: View| {
+        let mut frame = still(boxes, Some(RULES), Vec::new(), view);
+        frame.scene.set_face_images(index, [1.0; 2]);
+        frame.draw()
+    };
+    let up = [0.0, 0.0, 1.0];
+    // The camera, its up, and the red of the quarters of the face: upper left, upper right, lower left, lower right.
+    for (eye, up, quarters) in [
+        ([0.0, 0.0, 3.0], [0.0, 1.0, 0.0], [250, 150, 100, 50]),
+        ([0.0, 0.0, -3.0], [0.0, 1.0, 0.0], [150, 250, 50, 100]),
+        ([3.0, 0.0, 0.0], up, [250, 150, 100, 50]),
+        ([-3.0, 0.0, 0.0], up, [150, 250, 50, 100]),
+        ([0.0, -3.0, 0.0], up, [250, 150, 100, 50]),
+        ([0.0, 3.0, 0.0], up, [150, 250, 50, 100]),
+    ] {
+        let view = from(eye, up);
+        let (alone, below) = (draw(vec![cuboid(painted.clone())], 0, view), cuboid(matte([0.0; 3])));
+        let (later, earlier) = (
+            draw(vec![below.clone(), cuboid(painted.clone())], 1, view),
+            draw(vec![cuboid(painted.clone()), below], 0, view),
+        );
+        let axes = view.world_from_camera.rotation.map(|row| [row[0].abs(), row[1].abs()]);
+        let reach = [0, 1].map(|k| (0..3).map(|axis| axes[axis][k] * half[axis]).sum::<f32>());
+        for (k, expected) in quarters.into_iter().enumerate() {
+            let [x, y] = [if k % 2 == 0 { -0.5 } else { 0.5 } * reach[0], if k < 2 { 0.5 } else { -0.5 } * reach[1]];
+            assert_red(&alone, [x, y], expected as f32 / 255.0);
+        }
+        assert_eq!(later.color(), alone.color(), "{eye:?}");
+        assert!(later.depth() == alone.depth() && earlier.depth() == alone.depth());
+        assert!(earlier.mask().iter().all(|&id| id != 1) && later.mask().iter().all(|&id| id != 1), "{eye:?}");
+    }
+}

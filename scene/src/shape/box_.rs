@@ -15,6 +15,31 @@ pub struct Box {
 }
 
 impl Box {
+    /// Texture coordinates of a point of the surface, with v upward in the image, and their number per meter: the root of
+    /// the ratio of areas, in the texture and on the face. `images` are the repetitions of the texture across and along a
+    /// face.
+    ///
+    /// The image is across x and along y on the faces normal to z, y and z on those normal to x, x and z on those normal
+    /// to y. On opposite faces, one image is a mirror image. Source: MuJoCo's classic renderer, from 3.12 on.
+    pub fn face_coordinates(&self, point: V3, images: [f32; 2]) -> ([f64; 2], f64) {
+        let half = to_f64(self.half);
+        let at = [0, 1, 2].map(|k| point[k] / half[k]);
+        let normal = if at[0].abs() >= at[1].abs() && at[0].abs() >= at[2].abs() {
+            0
+        } else if at[1].abs() >= at[2].abs() {
+            1
+        } else {
+            2
+        };
+        let [across, along] = Self::FACE_AXES[normal];
+        let [columns, rows] = images.map(f64::from);
+        let uv = [(0.5 + 0.5 * at[across]) * columns, 1.0 - (0.5 - 0.5 * at[along]) * rows];
+        (uv, ((columns * rows).abs() / (4.0 * half[across] * half[along])).sqrt())
+    }
+
+    /// Axes across and along the image on the faces normal to each axis.
+    pub const FACE_AXES: [[usize; 2]; 3] = [[1, 2], [0, 2], [0, 1]];
+
     fn corner(&self, corner: usize) -> [f32; 3] {
         [0, 1, 2].map(|k| if corner >> k & 1 == 1 { self.half[k] } else { -self.half[k] })
     }
@@ -85,5 +110,42 @@ impl AreaSampling for Box {
         (position[axis], normal[axis]) = (sign * half[axis], sign);
         (position[j], position[k]) = (half[j] * (2.0 * a - 1.0), half[k] * (2.0 * b - 1.0));
         SurfacePoint { position, normal, triangle: 0 }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Points of the faces and their coordinates on one image per face, computed by hand: the image begins at the upper left
+    /// corner, where the axis across it is at its least and the axis along it at its largest.
+    #[test]
+    fn coordinates_on_faces() {
+        let cuboid = Box { half: [0.5, 0.25, 2.0] };
+        for (point, across, down) in [
+            // A quarter of the way across x, from a quarter below the upper end of y.
+            ([-0.25, 0.125, 2.0], 0.25, 0.25),
+            ([-0.25, 0.125, -2.0], 0.25, 0.25),
+            ([0.5, 0.125, -1.0], 0.75, 0.75),
+            ([-0.5, 0.125, -1.0], 0.75, 0.75),
+            ([0.25, -0.25, 1.0], 0.75, 0.25),
+            ([0.25, 0.25, 1.0], 0.75, 0.25),
+        ] {
+            for images in [[1.0f32, 1.0], [3.0, 2.0]] {
+                let (found, density) = cuboid.face_coordinates(point, images);
+                let expected = [across * f64::from(images[0]), 1.0 - down * f64::from(images[1])];
+                assert_eq!(found, expected, "{point:?} {images:?}");
+                // A step across and a step along the face: coordinates change by the root of the product.
+                let normal = (0..3).find(|&k| point[k].abs() == f64::from(cuboid.half[k])).expect("a face");
+                let moved = |axis: usize| {
+                    let mut at = point;
+                    at[axis] += 0.0625;
+                    let (uv, _) = cuboid.face_coordinates(at, images);
+                    (uv[0] - found[0]).hypot(uv[1] - found[1]) / 0.0625
+                };
+                let steps: Vec<f64> = (0..3).filter(|&axis| axis != normal).map(moved).collect();
+                assert!((density - (steps[0] * steps[1]).sqrt()).abs() < 1e-9, "{point:?}: {density} {steps:?}");
+            }
+        }
     }
 }
