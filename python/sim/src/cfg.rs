@@ -32,7 +32,7 @@ fn none_value(py: Python<'_>, kind: &str, field: &str, path: &str) -> PyResult<O
     if NONE_IS_FALSE.contains(&field) {
         return Ok(Some(Value::Boolean(false)));
     }
-    let optional = py.import("kinetoscope._optional")?.getattr("is_optional")?.call1((kind, field))?;
+    let optional = py.import("kinetoscope._accepted")?.getattr("is_optional")?.call1((kind, field))?;
     if optional.extract::<bool>()? {
         return Ok(None);
     }
