@@ -3,7 +3,7 @@
 use super::access_policy::AccessPolicy;
 use super::error::ServeError;
 use super::request_head::RequestHead;
-use super::response::{self, Status};
+use super::response::{self, FrameAncestors, Status};
 use super::view_backend::ViewBackend;
 use super::{page, websocket_session};
 use std::collections::BTreeMap;
@@ -28,6 +28,7 @@ const WEBSOCKET_PATH: &str = "/live";
 /// State shared by all connections.
 pub(super) struct ServerContext {
     policy: AccessPolicy,
+    frames: FrameAncestors,
     backend: Arc<dyn ViewBackend>,
     max_viewers: usize,
     viewers: AtomicUsize,
@@ -70,6 +71,7 @@ impl Server {
     pub(super) fn start(
         listener: TcpListener,
         policy: AccessPolicy,
+        frames: FrameAncestors,
         backend: Arc<dyn ViewBackend>,
         max_viewers: usize,
     ) -> Result<Self, ServeError> {
@@ -77,6 +79,7 @@ impl Server {
         listener.set_nonblocking(true).map_err(failed("cannot make the socket non-blocking"))?;
         let context = Arc::new(ServerContext {
             policy,
+            frames,
             backend,
             max_viewers,
             viewers: AtomicUsize::new(0),
@@ -217,7 +220,7 @@ fn serve_connection(stream: &mut TcpStream, context: &ServerContext) {
     }
     match (head.method.as_str(), head.path.as_str()) {
         ("GET" | "HEAD", "/" | "/index.html") => match super::token::random_hex() {
-            Ok(nonce) => response::send_page(stream, &page::html(&nonce), &nonce, with_body),
+            Ok(nonce) => response::send_page(stream, &page::html(&nonce), &nonce, context.frames, with_body),
             Err(_) => response::send_error(stream, Status::InternalError, with_body),
         },
         ("GET", WEBSOCKET_PATH) => upgrade(stream, context, head),
