@@ -170,6 +170,9 @@ impl Simulation {
     fn add_sensor(&self, py: Python<'_>, name: String, cfg: &Bound<'_, PyAny>) -> PyResult<Py<PyAny>> {
         self.add(py, name, cfg)
     }
+        if let Some(kind) = cfg::type_of(cfg)? {
+            cfg::check_sensor(py, &kind)?;
+        }
 
     /// Excludes collisions between two entities or bodies from now on: names such as ``"arm/link"``, or handles.
     fn exclude_collision(&self, py: Python<'_>, one: &Bound<'_, PyAny>, other: &Bound<'_, PyAny>) -> PyResult<()> {
@@ -388,9 +391,9 @@ impl Simulation {
         let is_list = randomization.try_iter().is_ok() && !randomization.is_instance_of::<PyDict>();
         let randomization: Randomization = if is_list {
             terms.set_item("terms", randomization.try_iter()?.collect::<PyResult<Vec<_>>>()?)?;
-            cfg::read("randomization", Some(terms.as_any()))?
+            cfg::read("Randomization", Some(terms.as_any()))?
         } else {
-            cfg::read("randomization", Some(randomization))?
+            cfg::read("Randomization", Some(randomization))?
         };
         let env_ids = envs(&self.shared, env_ids)?;
         self.shared.write(py, |sim| Ok(sim.properties_mut().randomize(&randomization, env_ids.as_deref())?))
