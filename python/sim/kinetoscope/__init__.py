@@ -19,6 +19,7 @@ preload()
 
 from . import cfg, errors  # noqa: E402
 from ._sim import (  # noqa: E402
+    FoxgloveServer,
     IkResult,
     MjcfPart,
     Playback,
@@ -27,6 +28,7 @@ from ._sim import (  # noqa: E402
     RigidObject,
     RigidObjectGroup,
     Robot,
+    Segmentation,
     Sensor,
     Server,
     SimulationManager,
@@ -52,12 +54,15 @@ if TYPE_CHECKING:
 # Loaded at the first use: the renderer imports mujoco, which takes longer than all of this package.
 _RENDERER = ("BatchRenderer", "Renderer", "patch_mujoco")
 
+# Type checkers would accept any misspelt name of a module with this function.
+if not TYPE_CHECKING:
 
-def __getattr__(name: str) -> Any:
-    """The renderer of the package kinetoscope-render."""
-    if name in _RENDERER:
-        return getattr(importlib.import_module("kinetoscope_render"), name)
-    raise AttributeError(f"module 'kinetoscope' has no attribute {name!r}")
+    def __getattr__(name: str) -> Any:
+        """The renderer of the package kinetoscope-render."""
+        if name in _RENDERER:
+            return getattr(importlib.import_module("kinetoscope_render"), name)
+        raise AttributeError(f"module 'kinetoscope' has no attribute {name!r}")
+
 
 
 def __dir__() -> list[str]:
@@ -66,6 +71,7 @@ def __dir__() -> list[str]:
 
 __all__ = [
     "BatchRenderer",
+    "FoxgloveServer",
     "IkResult",
     "MjcfPart",
     "Playback",
@@ -75,6 +81,7 @@ __all__ = [
     "RigidObject",
     "RigidObjectGroup",
     "Robot",
+    "Segmentation",
     "Sensor",
     "Server",
     "SimulationManager",
