@@ -38,5 +38,5 @@ mask = camera["mask"]
 visible = {name: (mask == cube.mask_id).sum(axis=(1, 2)) for name, cube in cubes.items()}
 for name, pixels in visible.items():
     print(f"{name}: {pixels} pixels")
-np.savez_compressed(arguments.out, color=camera["rgb"], depth=camera["depth"], mask=mask, ids=list(sim.mask_ids))
+np.savez_compressed(arguments.out, color=camera["rgb"], depth=camera["depth"], mask=mask, ids=[cube.mask_id for cube in cubes.values()], names=list(cubes))
 print("wrote", arguments.out)

@@ -92,7 +92,7 @@ def test_forms_of_arrays(arm_sim, form):
 
 def test_forms_of_indices(arm_sim):
     _, arm = arm_sim
-    for joints in ([1, 2], (1, 2), np.array([1, 2]), np.array([1, 2], dtype=np.uint8), range(1, 3), ["JOINT[23]"]):
+    for joints in ([1, 2], (1, 2), np.array([1, 2]), np.array([1, 2], dtype=np.uint8), range(1, 3), ["JOINT[23]"], ("JOINT2", "JOINT3")):
         arm.set_qpos_target(np.zeros(6))
         arm.set_qpos_target([0.25, -0.5], joint_ids=joints)
         np.testing.assert_array_equal(arm.qpos_target, np.tile([0, 0.25, -0.5, 0, 0, 0], (2, 1)))
@@ -103,6 +103,13 @@ def test_forms_of_indices(arm_sim):
         np.testing.assert_array_equal(arm.qpos_target, [[0] * 6, [0.1] * 6])
     arm.set_qpos_target([0.2] * 6, joint_ids="arm")
     np.testing.assert_array_equal(arm.qpos_target, np.full((2, 6), 0.2))
+
+
+def test_forms_of_patterns(arm_sim):
+    _, arm = arm_sim
+    for patterns in ("JOINT[23]", ["JOINT[23]"], ("JOINT2", "JOINT3"), ["JOINT2", "JOINT3"]):
+        assert arm.find_joints(patterns) == [1, 2]
+    assert arm.find_links("LINK1") == [arm.link_names.index("LINK1")]
 
 
 @pytest.mark.parametrize(
@@ -117,6 +124,9 @@ def test_forms_of_indices(arm_sim):
         (lambda s, a: a.set_qpos_target([0], joint_ids=[6]), ks.OutOfRangeError, "joint 6"),
         (lambda s, a: a.set_qpos_target([0], joint_ids=[0.5]), ks.ArgumentError, "indices"),
         (lambda s, a: a.set_qpos_target([0], joint_ids=["JOINT9"]), ks.UnknownNameError, "JOINT1"),
+        (lambda s, a: a.set_qpos_target([0, 0], joint_ids=["JOINT1", 2]), ks.ArgumentError, "joint_ids: 2 is not a text"),
+        (lambda s, a: a.find_joints(3), ks.ArgumentError, "patterns"),
+        (lambda s, a: a.find_links(["LINK1", None]), ks.ArgumentError, "patterns: None"),
         (lambda s, a: a.joint_ids("amr"), ks.UnknownNameError, "arm"),
         (lambda s, a: a.link_pose("nothing"), ks.UnknownNameError, "nothing"),
         (lambda s, a: s.add_robot(ks.bundled_robot("sr5", uid="arm")), ks.ConfigError, "taken"),

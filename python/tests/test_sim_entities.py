@@ -2,8 +2,11 @@
 
 import http.client
 import json
+import socket
 import subprocess
 import sys
+import xml.etree.ElementTree as ElementTree
+from types import MappingProxyType
 from urllib.parse import urlparse
 
 import numpy as np
@@ -95,17 +98,71 @@ def test_mjcf_parts():
     sim = ks.SimulationManager(num_envs=2, ground=None)
     cart = sim.add_mjcf(uid="cart", text=text)
     assert cart.joint_names == ["slide"] and cart.actuator_names == ["push"] and cart.total_mass == pytest.approx(3, rel=0.5)
-    cart.set_ctrl([[6.0], [0.0]], actuators=cart.actuator_ids(["push"]))
+    cart.set_ctrl([[6.0], [0.0]], actuators=cart.actuator_ids("push"))
     sim.update(50)
     # v = F t / m.
     np.testing.assert_allclose(cart.qvel[:, 0], [1.0, 0.0], atol=1e-9)
-    assert cart.qpos_columns(["slide"]) == [(0, 1)]
+    assert cart.qpos_columns(["slide"]) == cart.qvel_columns(("slide",)) == cart.qpos_columns("slide") == [(0, 1)]
+    assert cart.body_poses.shape == (2, len(cart.body_names), 7)
+    np.testing.assert_array_equal(cart.body_poses[:, cart.body_names.index("cart")], cart.body_pose("cart"))
     np.testing.assert_allclose(cart.body_pose("cart")[:, 0], cart.qpos[:, 0], atol=1e-12)
     cart.write_mocap_pose("target", [0, 0, 2, 1, 0, 0, 0], env_ids=[1])
     np.testing.assert_allclose(cart.body_pose("target")[:, 2], [1, 2])
     robot = sim.add_robot(uid="arm", mjcf=ks.MjcfFile(text="""<mujoco><worldbody><body name="b"><geom size="0.1"/>
       <body name="l"><joint name="j" axis="0 1 0"/><geom size="0.05" pos="0.3 0 0" mass="1"/></body></body></worldbody></mujoco>"""))
     assert robot.joint_names == ["j"]
+
+
+def test_structure_of_robots():
+    """The description against the URDF file."""
+    sim = ks.SimulationManager()
+    arm = sim.add_robot(ks.bundled_robot("sr5", uid="arm"))
+    file = ElementTree.parse(ks.asset("sr5/SR5.urdf"))
+    joints = {joint.get("name"): joint for joint in file.findall("joint")}
+    assert {joint["name"] for joint in arm.description["joints"]} == set(joints)
+    for joint in arm.description["joints"]:
+        element = joints[joint["name"]]
+        assert joint["type"] == element.get("type") and joint["child"] == element.find("child").get("link")
+        assert joint["parent"] == element.find("parent").get("link")
+        if joint["type"] != "fixed":
+            axis = np.array([float(x) for x in element.find("axis").get("xyz").split()])
+            np.testing.assert_allclose(joint["axis"], axis / np.linalg.norm(axis))
+    masses = {link["name"]: link["mass"] for link in arm.description["links"]}
+    for link in file.findall("link"):
+        mass = link.find("inertial/mass")
+        assert masses[link.get("name")] == (None if mass is None else pytest.approx(float(mass.get("value"))))
+    html = arm._repr_html_()
+    assert "<table>" in html and "JOINT1" in html
+    sim.destroy()
+    assert arm._repr_html_() == "&lt;Robot of a simulation that is destroyed&gt;"
+
+
+def every_entity():
+    """A simulation with an entity of each type."""
+    sim = ks.SimulationManager(num_envs=2)
+    sim.add_robot(ks.bundled_robot("sr5", uid="arm"))
+    sim.add_articulation(uid="cabinet", urdf=ks.asset("cabinet/cabinet.urdf"), init_pose=[3, 0, 0, 1, 0, 0, 0])
+    sim.add_rigid_object(uid="cube", init_pose=[0, 3, 1, 1, 0, 0, 0])
+    sim.add_rigid_object_group(uid="group", objects=[ks.RigidObjectCfg(uid="a", init_pose=[0, -3, 1, 1, 0, 0, 0])])
+    sim.add_terrain(uid="plate", heights=np.zeros((3, 3)), size=[1, 1], init_pose=[20, 0, 0, 1, 0, 0, 0])
+    sim.add_mjcf(uid="part", text="<mujoco><worldbody><body name='b'><joint/><geom size='0.1'/></body></worldbody></mujoco>")
+    sim.add_weld(uid="weld", first="cube", second="group.a")
+    sim.add_sensor("imu", ks.ImuCfg(body="cube"))
+    return sim
+
+
+def test_handles_of_an_entity_are_equal():
+    sim, other = every_entity(), every_entity()
+    for name in sim:
+        handle = sim[name]
+        assert handle == sim[name] and hash(handle) == hash(sim[name]), name
+        # Controls: other entities, the same entity of another simulation, and values that are no handles.
+        assert all(handle != sim[second] for second in sim if second != name), name
+        assert handle != other[name] and handle != name, name
+    assert len({entity[name] for entity in (sim, sim, other) for name in entity}) == 2 * len(sim) == 16
+    assert sim == sim and sim != other
+    task = ks.Task(sim, {"decimation": 1, "actions": {"a": {"type": "relative_joint_positions", "step": 0.1, "robot": "arm"}}, "observations": {"policy": {"j": {"type": "joint_pos_rel", "robot": "arm"}}}})
+    assert task.sim == sim != other and task == task and len({task.sim, sim}) == 1
 
 
 def test_states_of_robots(rng):
@@ -275,6 +332,62 @@ def test_recordings_are_replayed_bit_by_bit(tmp_path):
         sim.record(tmp_path / "y.npz", ["all"])
 
 
+def test_topics_and_periods(tmp_path, arm_sim):
+    """One topic or a list, a dict of periods or any other mapping."""
+    sim, _ = arm_sim
+    for number, topics in enumerate((ks.Topic.joint_states("arm"), [ks.Topic.joint_states("arm")], (ks.Topic.joint_states("arm"),))):
+        with sim.record(tmp_path / f"{number}.npz", topics, stream_periods=MappingProxyType({"arm": 5})):
+            sim.update(20)
+        archive = np.load(tmp_path / f"{number}.npz")
+        assert archive["arm/joint_states/positions"].shape == (5, 2, 6)
+    with sim.record(tmp_path / "events.mcap", "events"):
+        sim.update()
+    for topics in (3, ["events", 3]):
+        with pytest.raises(ks.ArgumentError, match="topic"):
+            sim.record(tmp_path / "x.npz", topics)
+    with pytest.raises(ks.ArgumentError, match="stream_periods"):
+        sim.record(tmp_path / "x.npz", stream_periods=[("arm", 5)])
+
+
+def test_learning_datasets(tmp_path, arm_sim):
+    """A LeRobot dataset: the numbers of its description, and tables in Parquet's format."""
+    sim, arm = arm_sim
+    path = tmp_path / "run.lerobot"
+    with sim.record(path, [ks.Topic.joint_states("arm"), ks.Topic.targets("arm")], task="reach"):
+        arm.set_qpos_target([0.1] * 6)
+        sim.update(30)
+    info = json.loads((path / "meta" / "info.json").read_text())
+    assert info["codebase_version"] == "v3.0" and info["total_episodes"] == 2 and info["total_tasks"] == 1
+    assert info["fps"] == 100 and info["features"]["action"]["shape"] == [6]
+    tables = sorted(path.rglob("*.parquet"))
+    assert tables and all(table.read_bytes()[:4] == b"PAR1" == table.read_bytes()[-4:] for table in tables)
+
+
+def test_a_stream_to_foxglove(arm_sim):
+    """A client opens the WebSocket and is welcomed; the stream ends when it is closed."""
+    sim, _ = arm_sim
+    server = sim.stream_to_foxglove("127.0.0.1:0", ks.Topic.joint_states("arm"))
+    url = urlparse(server.url)
+    assert url.scheme == "ws" and server.url in repr(server) and server.failure is None
+    with socket.create_connection((url.hostname, url.port), timeout=20) as client:
+        client.sendall(
+            f"GET / HTTP/1.1\r\nHost: {url.netloc}\r\nConnection: Upgrade\r\nUpgrade: websocket\r\nSec-WebSocket-Version: 13\r\n"
+            "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\nSec-WebSocket-Protocol: foxglove.sdk.v1\r\n\r\n".encode()
+        )
+        received = b""
+        while b"arm/joint_states" not in received:
+            sim.update()
+            received += client.recv(4096)
+        assert received.startswith(b"HTTP/1.1 101 ") and b"serverInfo" in received
+        assert server.clients == 1 and server.dropped_rows == 0
+    server.close()
+    assert server.clients == 0
+    with pytest.raises(ks.KinetoscopeError):
+        server.close()
+    with pytest.raises(ks.RecordingError, match="nowhere"):
+        sim.stream_to_foxglove("nowhere:1")
+
+
 def test_views(tmp_path):
     sim = ks.SimulationManager(num_envs=2)
     sim.add_rigid_object(uid="cube", rgba=[1, 0, 0, 1], init_pose=[0, 0, 0.5, 1, 0, 0, 0], shape=ks.ObjectShape.box(size=[1, 1, 1]))
@@ -294,6 +407,12 @@ def test_views(tmp_path):
     connection.request("GET", "/")
     page = connection.getresponse()
     assert page.status == 200 and b"<html" in page.read().lower()
+    # A notebook shows the page in a frame; the browser tests of the view show that this suffices.
+    assert "frame-ancestors http://localhost:*" in page.getheader("Content-Security-Policy")
+    plain = urlparse(sim.serve().url)
+    connection = http.client.HTTPConnection(plain.hostname, plain.port, timeout=20)
+    connection.request("HEAD", "/")
+    assert "frame-ancestors 'none'" in connection.getresponse().getheader("Content-Security-Policy")
     assert frame.server.url in frame._repr_html_() and 'width="300"' in frame._repr_html_()
     frame.server.close()
     with pytest.raises(OSError):

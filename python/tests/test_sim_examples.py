@@ -43,10 +43,47 @@ def test_dataset(tmp_path):
     assert len(np.unique(archive["mask"])) == 4
 
 
+def blocks_of_the_page():
+    """The Python programs in docs/python.md."""
+    page = (FOLDER.parents[1] / "docs" / "python.md").read_text()
+    return re.findall(r"```python\n(.*?)```", page, re.DOTALL)
+
+
+def test_programs_of_the_page(tmp_path, monkeypatch, capsys):
+    """The programs but those of tasks, with fewer environments, smaller images and no window."""
+    monkeypatch.chdir(tmp_path)
+    changes = {
+        "num_envs=64": "num_envs=2",
+        "ks.CameraCfg(": "ks.CameraCfg(width=32, height=24, ",
+        "sim.open_window()": "None",
+        "sim.stream_to_foxglove()": 'sim.stream_to_foxglove("127.0.0.1:0")',
+    }
+    blocks = [block for block in blocks_of_the_page() if "ks.Task(" not in block]
+    for old, new in changes.items():
+        assert any(old in block for block in blocks), old
+        blocks = [block.replace(old, new) for block in blocks]
+    first, configurations, recordings, segmentation = blocks
+    names = {}
+    exec(first, names)  # noqa: S102
+    assert names["arm"].qpos.shape == (2, 6) and names["cam"]["depth"].shape == (2, 24, 32)
+    (tmp_path / "scene.toml").write_text(ks.to_toml({"entities": {"dog": ks.bundled_robot("quadruped")}}))
+    own = {"ks": ks}
+    exec(configurations, own)  # noqa: S102
+    assert own["sim"].keys() == ["dog", "imu"] and 'type = "robot"' in own["text"]
+    # A recording of the same scene, from its start.
+    names["sim"].reset()
+    with names["sim"].record("run.npz"):
+        names["sim"].update(3)
+    names["sim"].reset()
+    exec(recordings, names)  # noqa: S102
+    assert names["stream"].clients == 0 and (tmp_path / "run.mcap").is_file()
+    exec(segmentation, names)  # noqa: S102
+    assert names["classes"].shape == (2, 24, 32) and "arm" in capsys.readouterr().out
+
+
 def test_tasks_of_the_page():
     """The tasks in docs/python.md."""
-    page = (FOLDER.parents[1] / "docs" / "python.md").read_text()
-    first, second = (code for code in re.findall(r"```python\n(.*?)```", page, re.DOTALL) if "ks.Task(" in code)
+    first, second = (code for code in blocks_of_the_page() if "ks.Task(" in code)
     sim = ks.SimulationManager(ks.SimulationManagerCfg.legged(num_envs=2, threads=1))
     sim.add_robot(ks.bundled_robot("quadruped", uid="dog"))
     sim.add_sensor("eye", ks.CameraCfg(width=16, height=16, extrinsics=ks.Extrinsics(parent="dog/base")))

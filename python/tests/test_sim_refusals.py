@@ -1,5 +1,6 @@
 """Arrays with gaps, masks of the wrong length, None, misspelt attributes, and panics: an error or the right numbers."""
 
+import dataclasses
 import os
 import re
 import subprocess
@@ -10,6 +11,7 @@ import numpy as np
 import pytest
 
 import kinetoscope as ks
+from kinetoscope import _accepted
 
 PACKED = np.dtype([("a", "<f8"), ("b", "i1")])
 START = [0.0, 0.5, -1.5, 0.3, -0.5, 0.0]
@@ -109,6 +111,55 @@ def test_misspelt_attributes_are_refused():
     for cfg in (ks.RobotCfg(), ks.SimulationManagerCfg(), ks.CameraCfg()):
         with pytest.raises(AttributeError, match="drvie"):
             cfg.drvie = 3
+
+
+@pytest.mark.parametrize(
+    ("call", "names"),
+    [
+        (lambda sim: sim.add_rigid_object(ks.TerrainCfg()), ("TerrainCfg", "RigidObjectCfg", "add_terrain()")),
+        (lambda sim: sim.add_robot(ks.ArticulationCfg(urdf="a")), ("ArticulationCfg", "RobotCfg", "add_articulation()")),
+        (lambda sim: sim.add_terrain(ks.CameraCfg()), ("CameraCfg", "TerrainCfg", "add_sensor()")),
+        (lambda sim: sim.add_robot(ks.SimulationManagerCfg()), ("SimulationManagerCfg", "RobotCfg", "SimulationManager()")),
+        (lambda sim: sim.add_robot({"type": "terrain"}), ("'terrain'", "RobotCfg", "add_terrain()")),
+        (lambda sim: sim.add_sensor("x", ks.RobotCfg()), ("RobotCfg", "sensor", "add_robot()")),
+        (lambda sim: sim.add_sensor("x", {"type": "weld"}), ("WeldCfg", "sensor", "add_weld()")),
+        (lambda sim: ks.SimulationManager(ks.RobotCfg()), ("RobotCfg", "SimulationManagerCfg", "add_robot()")),
+        (lambda sim: ks.SimulationManager.from_scene({"simulation": ks.WeldCfg()}), ("WeldCfg", "SimulationManagerCfg")),
+        (lambda sim: ks.SimulationManager.from_scene({"entities": {"a": ks.RobotCfg(drive=ks.WeldCfg())}}), ("drive", "WeldCfg", "DriveCfg")),
+        (lambda sim: sim.add("x", ks.RigidObjectGroupCfg(objects=[ks.TerrainCfg()])), ("objects", "TerrainCfg", "RigidObjectCfg")),
+        (lambda sim: sim.add_robot(urdf="a", drive=ks.CameraCfg()), ("drive", "CameraCfg", "DriveCfg")),
+        (lambda sim: sim.add_robot(ks.RobotCfg(drive=ks.CameraCfg())), ("drive", "CameraCfg", "DriveCfg")),
+        (lambda sim: sim.randomize(ks.IkCfg()), ("IkCfg", "Randomization")),
+        (lambda sim: ks.Task(sim, ks.IkCfg()), ("IkCfg", "task")),
+    ],
+)  # fmt: skip
+def test_configurations_of_another_class_are_refused(call, names):
+    """Only changed fields travel to Rust: a TerrainCfg without changes added a default cube."""
+    sim = ks.SimulationManager()
+    with pytest.raises(ks.ConfigError) as caught:
+        call(sim)
+    assert all(name in str(caught.value) for name in names), caught.value
+    assert len(sim) == 0
+
+
+def test_subclasses_of_configurations_are_accepted():
+    class RedCube(ks.RigidObjectCfg):
+        pass
+
+    sim = ks.SimulationManager()
+    assert sim.add_rigid_object(RedCube(uid="red", mass=3.0)).nominal_mass == 3.0
+    assert sim.add("second", RedCube()).uid == "second"
+
+
+def test_fields_of_every_class_accept_their_defaults():
+    """The check of classes inside configurations has no wrong finding."""
+    for kind, cls in _accepted._classes().items():
+        required = {field.name: [] for field in dataclasses.fields(cls) if is_required(field)}
+        assert _accepted.mistake(kind, cls(**required)) is None, kind
+
+
+def is_required(field):
+    return field.default is dataclasses.MISSING and field.default_factory is dataclasses.MISSING
 
 
 def test_default_names_are_those_of_the_classes():

@@ -75,3 +75,47 @@ def test_images_are_those_of_rust(tmp_path):
         assert images[-1] == (tmp_path / f"replay_{at:.3f}s.png").read_bytes()
     # A control: the states look different.
     assert images[0] != images[1]
+
+
+def test_camera_channels_are_those_of_rust(tmp_path):
+    """All channels of cameras on a moving arm and beside it, with noise, recorded by the command and by Python."""
+    channels = ["color", "depth", "distance", "mask", "normal", "shading_normal", "position", "albedo", "flow"]
+    side = ks.Placement.look_at(eye=[1.5, 1.5, 1.2], target=[0, 0, 0.4])
+    wrist = ks.Placement.pose(pos=[0, 0.1, 0.05], rotation=[0, 1, 0, 0])
+    scene = {
+        "simulation": ks.SimulationManagerCfg(num_envs=2, threads=2, seed=3),
+        "entities": {
+            "arm": ks.bundled_robot("sr5_with_hand", init_qpos={"JOINT2": 0.7, "JOINT3": -1.2}),
+            "ball": ks.RigidObjectCfg(shape=ks.ObjectShape.sphere(radius=0.15), init_pose=[0.4, 0.5, 1.0, 1, 0, 0, 0]),
+            "side": ks.CameraCfg(width=48, height=36, channels=channels, extrinsics=ks.Extrinsics(placement=side), update_period=0.05),
+            "wrist": ks.CameraCfg(
+                width=40, height=30, channels=channels, extrinsics=ks.Extrinsics(parent="arm/ee_link", placement=wrist),
+                renderer="hybrid", update_period=0.1,
+            ),
+        },
+    }  # fmt: skip
+
+    def recorded(name):
+        """Recordings of 30 steps of the scene, by the command and by Python."""
+        path = tmp_path / f"{name}.toml"
+        path.write_text(ks.to_toml(scene))
+        own, other = tmp_path / f"{name}_python.npz", tmp_path / f"{name}_rust.npz"
+        result = command("view", path, "--serve", "127.0.0.1:0", "--steps", "30", "--speed", "10", "--record", other)
+        assert result.returncode in (0, 1), result.stdout + result.stderr
+        sim = ks.SimulationManager.from_file(path)
+        with sim.record(own):
+            sim.update(30)
+        return np.load(own), np.load(other)
+
+    own, other = recorded("scene")
+    images = [f"{camera}/{channel}" for camera in ("side", "wrist") for channel in channels]
+    assert set(own.files) == set(other.files) >= set(images)
+    for name in images:
+        assert own[name].shape[0] >= 3 and own[name].shape[1] == 2, name
+        assert own[name].tobytes() == other[name].tobytes(), name
+        # The images show something that changes.
+        assert own[name][0].tobytes() != own[name][-1].tobytes() or name.endswith("albedo"), name
+    # A control: a ball at another place changes the images.
+    scene["entities"]["ball"].init_pose = [0.4, 0.6, 1.0, 1, 0, 0, 0]
+    moved, _ = recorded("moved")
+    assert moved["side/depth"].tobytes() != own["side/depth"].tobytes()

@@ -213,3 +213,57 @@ def test_display_in_notebooks(scene):
     assert html.count("<img") == N * 9 - N and "data:image/png;base64," in html
     assert scene["imu"]._repr_html_().startswith("<pre>")
     scene["feet"].set_debug_vis(True)
+
+
+def test_segments_and_boxes():
+    """Two boxes below a camera, one partly hidden: the judges are the mask and the sizes of the boxes."""
+    sim = ks.SimulationManager(num_envs=2)
+    for uid, y, z, size in (("low", 0.0, 0.1, 0.2), ("high", 0.1, 0.5, 0.1)):
+        shape = ks.ObjectShape.box(size=[size] * 3)
+        sim.add_rigid_object(uid=uid, shape=shape, body_type="static", init_pose=[0, y, z, 1, 0, 0, 0])
+    above = ks.Placement.look_at(eye=[0, 0, 1.5], target=[0, 0, 0], up=[1, 0, 0])
+    camera = sim.add_sensor("camera", ks.CameraCfg(width=64, height=48, channels=["mask"], extrinsics=ks.Extrinsics(placement=above)))
+    sim.update()
+    mask, (low, high) = camera["mask"], (sim[uid].mask_id for uid in ("low", "high"))
+    segmentation = sim.segmentation({"low|high": "box"})
+    names = {row["name"]: row for row in segmentation.segments()}
+    assert names["low"]["mask_ids"] == [low] and names["high"]["class"] == "box" and "ground" in names
+    assert [row["mask_ids"] for row in segmentation.segments("semantic") if row["name"] == "box"] == [sorted([low, high])]
+    # Instances have the ids of the mask; boxes are one class.
+    np.testing.assert_array_equal(segmentation.segment(mask), mask)
+    classes = segmentation.segment(mask[0], level="semantic")
+    assert classes.shape == (48, 64) and classes.dtype == np.int32
+    assert len({*classes[(mask[0] == low) | (mask[0] == high)]}) == 1
+    colors = segmentation.colorize(mask)
+    assert colors.shape == (2, 48, 64, 4) and colors.dtype == np.uint8
+    np.testing.assert_array_equal(segmentation.colorize(mask[1].astype(np.int64)), colors[1])
+    assert len(np.unique(colors[0].reshape(-1, 4), axis=0)) == len(np.unique(mask[0]))
+    boxes = {row["name"]: row for row in segmentation.boxes_2d(camera, env=1)}
+    for uid, mask_id in (("low", low), ("high", high)):
+        v, u = np.nonzero(mask[1] == mask_id)
+        assert boxes[uid]["tight"] == (u.min(), v.min(), u.max() + 1, v.max() + 1)
+        assert boxes[uid]["visible_pixels"] == len(u)
+    solid = {row["name"]: row for row in segmentation.boxes_3d(camera)}
+    np.testing.assert_allclose(solid["high"]["pose"], sim["high"].pose[0], atol=1e-6)
+    np.testing.assert_allclose([solid["low"]["min"], solid["low"]["max"]], [[-0.1] * 3, [0.1] * 3], atol=1e-6)
+    hidden = {row["name"]: row for row in segmentation.occlusions(camera)}
+    assert hidden["high"]["ratio"] == 0 and 0 < hidden["low"]["ratio"] < 1
+    assert hidden["low"]["visible_pixels"] == (mask[0] == low).sum() < hidden["low"]["unoccluded_pixels"]
+    with pytest.raises(ks.ArgumentError, match="instance"):
+        segmentation.segments("object")
+    with pytest.raises(ks.ArgumentError, match="whole numbers"):
+        segmentation.segment(np.zeros((2, 2)))
+    with pytest.raises(ks.KinetoscopeError, match="nothing"):
+        sim.segmentation({"nothing": "box"})
+    # Points of pixels, and environments of rows.
+    partial = sim.add_sensor("partial", ks.CameraCfg(width=6, height=4, channels=["depth"], env_ids=[1], extrinsics=ks.Extrinsics(placement=above)))
+    assert partial.env_ids == [1] and camera.env_ids == [0, 1] and partial["depth"].shape == (1, 4, 6)
+    points = partial.point_map(1, "camera")
+    np.testing.assert_array_equal(points[..., 2], partial["depth"][0])
+    np.testing.assert_allclose(partial.point_map(1).reshape(-1, 3), partial.point_cloud(1), atol=1e-6)
+    other = ks.SimulationManager()
+    with pytest.raises(ks.ForeignHandleError):
+        segmentation.boxes_2d(other.add_sensor("camera", ks.CameraCfg(width=4, height=4, channels=["mask"])))
+    sim.add_sensor("imu", ks.ImuCfg(body="low"))
+    with pytest.raises(ks.ArgumentError, match="camera"):
+        segmentation.boxes_2d(sim["imu"])

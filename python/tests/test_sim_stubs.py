@@ -1,5 +1,6 @@
 """Types: the package passes mypy in strict mode, and the stub of the extension module fits it."""
 
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -9,6 +10,7 @@ import pytest
 import kinetoscope
 
 PACKAGE = Path(kinetoscope.__file__).parent
+PROJECT = Path(__file__).parents[2]
 
 
 def run(*command):
@@ -48,7 +50,35 @@ def test_types_of_a_program(strict, tmp_path):
         "waves = ks.TerrainGenerator.waves(ks.WavesTerrain())\n"
     )
     assert run("mypy", "--config-file", strict, str(program)).returncode == 0
-    # A control: mistakes are found.
-    program.write_text(program.read_text() + "arm.qops\nks.DriveCfg(stiff=1.0)\nks.CameraCfg(width='a')\n")
+    # Controls: each of these mistakes is found.
+    mistakes = [
+        "arm.qops",
+        "ks.DriveCfg(stiff=1.0)",
+        "ks.CameraCfg(width='a')",
+        "ks.RobtoCfg()",
+        "ks.no_such_function(1)",
+        "sim.add_robot(ks.CameraCfg())",
+        "sim.add_sensor('x', ks.RobotCfg())",
+        "arm.set_drive_type('torque')",
+        "sim.property('mss', 'arm')",
+        "sim.record('run.npz', ['all'])",
+        "ks.SimulationManager.from_scene(True)",
+        "text: str = sim.screenshot()",
+    ]
+    program.write_text(program.read_text() + "\n".join(mistakes) + "\n")
     result = run("mypy", "--config-file", strict, str(program))
-    assert result.stdout.count(": error:") == 3, result.stdout
+    assert result.stdout.count(": error:") == len(mistakes), result.stdout
+
+
+def test_types_of_the_page_and_the_examples(strict, tmp_path):
+    """The Python blocks of docs/python.md, one program, and the example scripts."""
+    blocks = re.findall(r"```python\n(.*?)```", (PROJECT / "docs" / "python.md").read_text(), re.DOTALL)
+    assert len(blocks) > 4
+    program = tmp_path / "page.py"
+    program.write_text("\n".join(["import numpy as np", "actions = np.zeros((64, 12))", *blocks]))
+    for path in (program, *sorted((PROJECT / "python" / "examples").glob("*.py"))):
+        result = run("mypy", "--config-file", strict, str(path))
+        assert result.returncode == 0, result.stdout
+    # A control: a mistake in a block is found.
+    program.write_text(program.read_text().replace("sim.update(500)", "sim.update('500')", 1))
+    assert run("mypy", "--config-file", strict, str(program)).returncode == 1

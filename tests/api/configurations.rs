@@ -68,6 +68,7 @@ fn views() {
     check("title = \"depth\"", &ImageWindowCfg { title: "depth".into(), ..ImageWindowCfg::default() });
     let serve = ServeCfg { max_viewers: 2, speed: Some(Speed::Unlimited), ..ServeCfg::default() };
     check("max_viewers = 2\nspeed = \"unlimited\"", &serve);
+    check("allow_local_frames = true", &ServeCfg { allow_local_frames: true, ..ServeCfg::default() });
     let camera = Some(OrbitCamera { distance: 5.0, ..OrbitCamera::default() });
     let overlays = Overlays { contacts: true, ..Overlays::default() };
     let shot = ScreenshotCfg { camera, envs: EnvSelection::One(3), overlays, ..ScreenshotCfg::default() };

@@ -25,9 +25,12 @@ const SCRIPTS: &str = "../shared/seeds";
 /// of tensors are left out by name.
 const WANTS_TORCH: &str = "KINETOSCOPE_TORCH";
 
-/// Packages of the tests. `create_sensor` of EmbodiChain calls a method that NumPy 2 does not have.
-const PACKAGES: [&str; 8] = [
-    "numpy==1.26.4",
+/// Versions of NumPy with which the package is tested: one that EmbodiChain's `create_sensor` runs on, which calls a method
+/// that NumPy 2 does not have, and one that `pip` installs beside the package. Torch is tested with the first.
+const NUMPY: [&str; 2] = ["1.26.4", "2.4.6"];
+
+/// Other packages of the tests.
+const PACKAGES: [&str; 7] = [
     "gymnasium==1.4.0",
     "pytest==9.2.0",
     "scipy==1.17.1",
@@ -70,14 +73,24 @@ pub(crate) fn test(repo: &Repo) -> XtaskResult {
     // The judge of the test that compares with Rust.
     let all = ["--workspace"];
     ready.cargo().arg("build").args(all).args(test::features(&all)).args(["--bin", "kinetoscope"]).run()?;
-    let python = environment(repo)?;
-    install(&python, &wheels)?;
+    for numpy in NUMPY {
+        let python = environment(repo, numpy)?;
+        install(&python, &wheels)?;
+        println!("kinetoscope with NumPy {numpy}");
+        run_tests(repo, &ready, &python)
+            .map_err(|failure| Failure::new(format!("NumPy {numpy}: {}", failure.message)))?;
+    }
+    Ok(())
+}
+
+/// Runs the tests in an environment with the installed wheels.
+fn run_tests(repo: &Repo, ready: &Prepared, python: &Path) -> XtaskResult {
     // The requirements of the wheels are those that are installed.
-    Cmd::new(&python).args(["-m", "pip", "--disable-pip-version-check", "check"]).run()?;
-    let mut tests = Cmd::new(&python).args(["-m", "pytest", "-q", "-p", "no:cacheprovider", "."]);
-    let has_torch = Cmd::new(&python).args(["-c", "import torch"]).quiet().succeeds();
+    Cmd::new(python).args(["-m", "pip", "--disable-pip-version-check", "check"]).run()?;
+    let mut tests = Cmd::new(python).args(["-m", "pytest", "-q", "-p", "no:cacheprovider", "."]);
+    let has_torch = Cmd::new(python).args(["-c", "import torch"]).quiet().succeeds();
     if !has_torch {
-        println!("note: without torch, its tests are left out; {WANTS_TORCH}=1 installs it");
+        println!("note: without torch, its tests are left out; {WANTS_TORCH}=1 installs it beside NumPy {}", NUMPY[0]);
         tests = tests.env("KINETOSCOPE_TESTS_WITHOUT_TORCH", "1");
     }
     let scripts = repo.root.join(SCRIPTS);
@@ -119,18 +132,20 @@ fn prepare(repo: &Repo) -> XtaskResult<Prepared> {
     setup::prepare(repo, Requirements { version: Some(MujocoVersion::Wheel), extras: &[] })
 }
 
-/// The environment of the tests, below the target folder.
-fn environment(repo: &Repo) -> XtaskResult<PathBuf> {
-    let venv = repo.target.join("python-sim-venv");
+/// The environment of the tests with a version of NumPy, below the target folder.
+fn environment(repo: &Repo, numpy: &str) -> XtaskResult<PathBuf> {
+    let venv = repo.target.join(format!("python-sim-numpy-{numpy}"));
     let python = venv.join("bin/python");
-    let check =
-        "import cv2, gymnasium, matplotlib, mypy, numpy, pytest, scipy, PIL; assert numpy.__version__ == '1.26.4'";
-    let is_ready = || Cmd::new(&python).args(["-c", check]).quiet().succeeds();
+    let check = format!(
+        "import cv2, gymnasium, matplotlib, mypy, numpy, pytest, scipy, PIL; assert numpy.__version__ == '{numpy}'"
+    );
+    let is_ready = || Cmd::new(&python).args(["-c", &check]).quiet().succeeds();
     if !is_ready() {
         let core = format!("mujoco-core=={}", wheel::VERSION);
-        create(&venv, &[&[core.as_str()][..], &PACKAGES].concat())?;
+        create(&venv, &[&[core.as_str(), &format!("numpy=={numpy}")][..], &PACKAGES].concat())?;
     }
-    if env::var_os(WANTS_TORCH).is_some() && !Cmd::new(&python).args(["-c", "import torch"]).quiet().succeeds() {
+    let wants_torch = numpy == NUMPY[0] && env::var_os(WANTS_TORCH).is_some();
+    if wants_torch && !Cmd::new(&python).args(["-c", "import torch"]).quiet().succeeds() {
         python::pip_install(&python, &["torch==2.15.0"])?;
     }
     if is_ready() { Ok(python) } else { Err(Failure::new("the packages of the tests cannot be imported")) }

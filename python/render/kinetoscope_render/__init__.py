@@ -28,13 +28,15 @@ __all__ = ["BatchRenderer", "Renderer", "__version__", "patch_mujoco", "unpatch_
 # Modules of the public names. They import mujoco, so that `doctor` can report its absence.
 _MODULES = {"BatchRenderer": "batch", "Renderer": "renderer", "patch_mujoco": "patch", "unpatch_mujoco": "patch"}
 
+# Type checkers would accept any misspelt name of a module with this function.
+if not TYPE_CHECKING:
 
-def __getattr__(name: str) -> Any:
-    if name not in _MODULES:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    value = getattr(importlib.import_module(f"{__name__}.{_MODULES[name]}"), name)
-    globals()[name] = value
-    return value
+    def __getattr__(name: str) -> Any:
+        if name not in _MODULES:
+            raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+        value = getattr(importlib.import_module(f"{__name__}.{_MODULES[name]}"), name)
+        globals()[name] = value
+        return value
 
 
 def __dir__() -> list[str]:

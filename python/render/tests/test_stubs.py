@@ -51,6 +51,6 @@ def test_types_of_a_program(strict, tmp_path):
     )
     result = run("mypy", "--config-file", strict, str(program))
     assert result.returncode == 0, result.stdout + result.stderr
-    program.write_text(program.read_text() + "renderer.rendr()\nkr.Renderer(model, width='64')\nkr.BatchRenderer()\n")
+    program.write_text(program.read_text() + "renderer.rendr()\nkr.Renderer(model, width='64')\nkr.BatchRenderer()\nkr.Rendrer\n")
     result = run("mypy", "--config-file", strict, str(program))
-    assert result.stdout.count(": error:") == 3, result.stdout
+    assert result.stdout.count(": error:") == 4, result.stdout

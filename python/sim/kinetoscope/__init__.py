@@ -19,6 +19,7 @@ preload()
 
 from . import cfg, errors  # noqa: E402
 from ._sim import (  # noqa: E402
+    FoxgloveServer,
     IkResult,
     MjcfPart,
     Playback,
@@ -27,6 +28,7 @@ from ._sim import (  # noqa: E402
     RigidObject,
     RigidObjectGroup,
     Robot,
+    Segmentation,
     Sensor,
     Server,
     SimulationManager,
@@ -60,12 +62,15 @@ _LATER = {
     "patch_mujoco": "kinetoscope_render",
 }
 
+# Type checkers would accept any misspelt name of a module with this function.
+if not TYPE_CHECKING:
 
-def __getattr__(name: str) -> Any:
-    """Classes of other packages, and those that need other packages."""
-    if name in _LATER:
-        return getattr(importlib.import_module(_LATER[name]), name)
-    raise AttributeError(f"module 'kinetoscope' has no attribute {name!r}")
+    def __getattr__(name: str) -> Any:
+        """Classes of other packages, and those that need other packages."""
+        if name in _LATER:
+            return getattr(importlib.import_module(_LATER[name]), name)
+        raise AttributeError(f"module 'kinetoscope' has no attribute {name!r}")
+
 
 
 def __dir__() -> list[str]:
@@ -74,6 +79,7 @@ def __dir__() -> list[str]:
 
 __all__ = [
     "BatchRenderer",
+    "FoxgloveServer",
     "IkResult",
     "MjcfPart",
     "Playback",
@@ -83,6 +89,7 @@ __all__ = [
     "RigidObject",
     "RigidObjectGroup",
     "Robot",
+    "Segmentation",
     "Sensor",
     "Server",
     "SimulationManager",

@@ -8,7 +8,7 @@ use kinetoscope::sim::{EnvId, JointIndex, RobotId, SimulationManager};
 use numpy::{PyArray, PyArray1, PyArrayDyn, PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
-use pyo3::types::{PyBool, PyDict, PyInt, PyList, PyString, PyTuple};
+use pyo3::types::{PyBool, PyDict, PyInt, PyList, PySequence, PyString, PyTuple};
 
 /// Numbers of an argument: an array, a list, a tensor, anything that NumPy accepts. Missing leading axes are added, so
 /// that one row stands for all environments.
@@ -64,6 +64,32 @@ fn numpy<'py>(obj: &Bound<'py, PyAny>, name: &str, dtype: &str) -> PyResult<Boun
         options.set_item("dtype", dtype)?;
     }
     asarray.call((obj,), Some(&options)).map_err(|error| Failure::argument(name, error.value(py)).into())
+}
+
+/// Integers of an argument, such as a mask image: an array of whole numbers, of any shape.
+pub(crate) fn integers(obj: &Bound<'_, PyAny>, name: &str) -> PyResult<ArrayD<i32>> {
+    if let Ok(array) = obj.cast::<PyArrayDyn<i32>>()
+        && is_plain(array)
+    {
+        let borrowed = array.try_readonly().map_err(|error| Failure::argument(name, error))?;
+        return Ok(borrowed.as_array().to_owned());
+    }
+    let converted = numpy(obj, name, "")?;
+    let kind: String = converted.getattr("dtype")?.getattr("kind")?.extract()?;
+    if !matches!(kind.as_str(), "i" | "u") || converted.getattr("ndim")?.extract::<usize>()? >= MAX_AXES {
+        let message = "expected an array of whole numbers, such as the channel mask of a camera";
+        return Err(Failure::argument(name, message).into());
+    }
+    // A copy has the layout that the array type of Rust assumes.
+    let converted = converted.call_method1("astype", ("int64",))?;
+    let array = converted.cast::<PyArrayDyn<i64>>().map_err(|error| Failure::argument(name, error))?;
+    let borrowed = array.try_readonly().map_err(|error| Failure::argument(name, error))?;
+    let values = borrowed.as_array();
+    let wrong = |value: &&i64| i32::try_from(**value).is_err();
+    if let Some(value) = values.iter().find(wrong) {
+        return Err(Failure::argument(name, format!("{value} is not an int32")).into());
+    }
+    Ok(values.mapv(|value| value as i32))
 }
 
 /// Indices, or a mask of the items that are selected.
@@ -147,6 +173,33 @@ pub(crate) fn env_indices(shared: &Shared, obj: Option<&Bound<'_, PyAny>>) -> Py
     Ok(envs(shared, obj)?.map(|ids| ids.into_iter().map(|id| id.0).collect()))
 }
 
+/// Texts of a list, a tuple or another sequence; `None` for a sequence of other values, and for other types.
+fn texts(obj: &Bound<'_, PyAny>, name: &str) -> PyResult<Option<Vec<String>>> {
+    let Ok(items) = obj.cast::<PySequence>() else { return Ok(None) };
+    let mut texts = Vec::new();
+    for item in items.try_iter()? {
+        let item = item?;
+        match item.cast::<PyString>() {
+            Ok(text) => texts.push(text.to_str()?.to_owned()),
+            Err(_) if texts.is_empty() => return Ok(None),
+            Err(_) => {
+                return Err(Failure::argument(name, format!("{item} is not a text, as the items before it")).into());
+            }
+        }
+    }
+    Ok(Some(texts))
+}
+
+/// Patterns of names: a text, or a sequence of texts.
+pub(crate) fn patterns(obj: &Bound<'_, PyAny>) -> PyResult<Vec<String>> {
+    if let Ok(text) = obj.cast::<PyString>() {
+        return Ok(vec![text.to_str()?.to_owned()]);
+    }
+    let found = obj.get_type().name()?;
+    let wrong = || Failure::argument("patterns", format!("expected a pattern of names or a list of them, not {found}"));
+    Ok(texts(obj, "patterns")?.ok_or_else(wrong)?)
+}
+
 /// Joints or links of an argument.
 #[derive(Debug)]
 pub(crate) enum Selection {
@@ -164,16 +217,13 @@ impl Selection {
         if let Ok(part) = obj.cast::<PyString>() {
             return Ok(Self::Part(part.to_str()?.into()));
         }
-        let texts = obj
-            .cast::<PyList>()
-            .is_ok_and(|list| !list.is_empty() && list.iter().all(|item| item.is_instance_of::<PyString>()));
-        if texts {
-            return obj.extract().map(Self::Patterns);
+        match texts(obj, name)? {
+            Some(patterns) if !patterns.is_empty() => Ok(Self::Patterns(patterns)),
+            _ => Ok(Self::Ids(indices(obj, name)?, name.into())),
         }
-        Ok(Self::Ids(indices(obj, name)?, name.into()))
     }
 
-    /// Joints of a robot: a text is a control part, a list of texts are patterns of joint names.
+    /// Joints of a robot: a text is a control part, a sequence of texts are patterns of joint names.
     pub(crate) fn joints(&self, sim: &SimulationManager, robot: RobotId) -> Result<Option<Vec<JointIndex>>, Failure> {
         Ok(match self {
             Self::All => None,

@@ -32,7 +32,7 @@ fn none_value(py: Python<'_>, kind: &str, field: &str, path: &str) -> PyResult<O
     if NONE_IS_FALSE.contains(&field) {
         return Ok(Some(Value::Boolean(false)));
     }
-    let optional = py.import("kinetoscope._optional")?.getattr("is_optional")?.call1((kind, field))?;
+    let optional = py.import("kinetoscope._accepted")?.getattr("is_optional")?.call1((kind, field))?;
     if optional.extract::<bool>()? {
         return Ok(None);
     }
@@ -42,9 +42,30 @@ fn none_value(py: Python<'_>, kind: &str, field: &str, path: &str) -> PyResult<O
 /// Largest depth of nested values; a structure that contains itself has no end.
 const MAX_DEPTH: usize = 64;
 
+/// Raises the error that a function of `kinetoscope._accepted` finds, if any.
+fn refuse<'py>(py: Python<'py>, function: &str, arguments: impl pyo3::call::PyCallArgs<'py>) -> PyResult<()> {
+    let message = py.import("kinetoscope._accepted")?.getattr(function)?.call1(arguments)?;
+    match message.extract::<Option<String>>()? {
+        None => Ok(()),
+        Some(message) => Err(Failure::new(Class::Config, message).into()),
+    }
+}
+
+/// Refuses configurations of entities that are not sensors.
+pub(crate) fn check_sensor(py: Python<'_>, kind: &str) -> PyResult<()> {
+    refuse(py, "not_a_sensor", (kind,))
+}
+
 /// Converts the fields of a configuration: of a dataclass, those that differ from their defaults; of a mapping, all.
-/// `kind` is the type of the configuration: that of an entity in scene files, [`SIMULATION`] or [`ANY`].
+/// `kind` is the type of the configuration: that of an entity in scene files, [`SIMULATION`], the name of a class, or
+/// [`ANY`].
+///
+/// # Errors
+/// The configuration or a part of it has another class of the package: its fields would be lost silently.
 pub(crate) fn table(kind: &str, cfg: Option<&Bound<'_, PyAny>>, fields: Option<&Bound<'_, PyDict>>) -> PyResult<Table> {
+    if let Some(cfg) = cfg {
+        refuse(cfg.py(), "mistake", (kind, cfg))?;
+    }
     let mut table = match cfg.map(|cfg| value(cfg, kind, "", 0)).transpose()? {
         None | Some(None) => Table::new(),
         Some(Some(Value::Table(table))) => table,
@@ -56,6 +77,7 @@ pub(crate) fn table(kind: &str, cfg: Option<&Bound<'_, PyAny>>, fields: Option<&
     };
     for (name, field) in fields.into_iter().flatten() {
         let name: String = name.extract()?;
+        refuse(field.py(), "mistake_in_field", (kind, &name, &field))?;
         let given = match value(&field, ANY, &name, 0)? {
             None => none_value(field.py(), kind, &name, &name)?,
             given => given,
@@ -227,9 +249,9 @@ pub(crate) fn default_uid(kind: &str) -> String {
     }
 }
 
-/// Reads a configuration that is not part of scene files.
+/// Reads a configuration that is not part of scene files. `what` is the name of its class, or of its content.
 pub(crate) fn read<T: DeserializeOwned>(what: &str, cfg: Option<&Bound<'_, PyAny>>) -> PyResult<T> {
-    let fields = table(ANY, cfg, None)?;
+    let fields = table(what, cfg, None)?;
     let invalid = |error: toml::de::Error| Failure::new(Class::Config, format!("{what}: {}", error.message()));
     Ok(guarded(|| Value::Table(fields).try_into().map_err(invalid))?)
 }
@@ -257,12 +279,16 @@ pub(crate) fn changed_simulation(
 /// Table of a scene from a dict: entities may be configurations with a type, whose `uid` is replaced by the name.
 pub(crate) fn scene_table(scene: &Bound<'_, PyAny>) -> PyResult<Table> {
     let mut document = table(ANY, Some(scene), None)?;
+    if let Ok(simulation) = scene.get_item(SIMULATION) {
+        refuse(scene.py(), "mistake", (SIMULATION, simulation))?;
+    }
     let entities = scene.get_item("entities").ok();
     if let (Some(Value::Table(converted)), Some(entities)) = (document.get_mut("entities"), entities) {
         for item in entities.cast::<PyMapping>()?.items()?.iter() {
             let (name, entity): (String, Bound<'_, PyAny>) = item.extract()?;
             let Some(Value::Table(fields)) = converted.get_mut(&name) else { continue };
             if let Some(kind) = type_of(&entity)? {
+                refuse(entity.py(), "mistake", (&kind, &entity))?;
                 fields.insert("type".into(), Value::String(kind));
             }
             if entity.cast::<PyMapping>().is_err() {

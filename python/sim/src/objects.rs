@@ -1,13 +1,15 @@
 //! Rigid objects, groups of them, terrains, attached MJCF files and welds.
 
-use crate::arguments::{array, envs, indices};
+use crate::arguments::{array, envs, indices, patterns};
 use crate::robot::{arrays, wrench_frame, writers};
-use crate::shared::Shared;
+use crate::shared::{Shared, equal_handles};
 use kinetoscope::ndarray::{Ix1, Ix2, Ix3};
 use kinetoscope::sim::{ActuatorIndex, BodyType, MjcfId, RigidObjectGroupId, RigidObjectId, TerrainId, WeldId};
 use numpy::IntoPyArray;
 use pyo3::prelude::*;
 use std::sync::Arc;
+
+equal_handles! { RigidObject: id, RigidObjectGroup: id, Terrain: id, MjcfPart: id, Weld: id }
 
 /// A rigid object in all environments. Arrays have the environments on the first axis.
 #[pyclass(frozen, module = "kinetoscope")]
@@ -278,15 +280,17 @@ impl MjcfPart {
         self.shared.read(py, |sim| Ok(sim.mjcf_part(self.id).total_mass()))
     }
 
-    /// Indices of the actuators whose names match one of the patterns.
-    fn actuator_ids(&self, py: Python<'_>, patterns: Vec<String>) -> PyResult<Vec<usize>> {
+    /// Indices of the actuators whose names match a pattern, or one of several.
+    fn actuator_ids(&self, py: Python<'_>, patterns: &Bound<'_, PyAny>) -> PyResult<Vec<usize>> {
+        let patterns = self::patterns(patterns)?;
         self.shared.read(py, |sim| {
             Ok(sim.mjcf_part(self.id).actuator_ids(&patterns)?.into_iter().map(|actuator| actuator.0).collect())
         })
     }
 
-    /// Columns of ``qpos`` of the joints that match one of the patterns, as (first, end) of each joint.
-    fn qpos_columns(&self, py: Python<'_>, patterns: Vec<String>) -> PyResult<Vec<(usize, usize)>> {
+    /// Columns of ``qpos`` of the joints that match a pattern, or one of several, as (first, end) of each joint.
+    fn qpos_columns(&self, py: Python<'_>, patterns: &Bound<'_, PyAny>) -> PyResult<Vec<(usize, usize)>> {
+        let patterns = self::patterns(patterns)?;
         self.shared.read(py, |sim| {
             Ok(sim
                 .mjcf_part(self.id)
@@ -297,8 +301,9 @@ impl MjcfPart {
         })
     }
 
-    /// Columns of ``qvel`` of the joints that match one of the patterns, as (first, end) of each joint.
-    fn qvel_columns(&self, py: Python<'_>, patterns: Vec<String>) -> PyResult<Vec<(usize, usize)>> {
+    /// Columns of ``qvel`` of the joints that match a pattern, or one of several, as (first, end) of each joint.
+    fn qvel_columns(&self, py: Python<'_>, patterns: &Bound<'_, PyAny>) -> PyResult<Vec<(usize, usize)>> {
+        let patterns = self::patterns(patterns)?;
         self.shared.read(py, |sim| {
             Ok(sim
                 .mjcf_part(self.id)
@@ -307,6 +312,12 @@ impl MjcfPart {
                 .map(|range| (range.start, range.end))
                 .collect())
         })
+    }
+
+    /// Poses of all bodies in the environment, in the order of ``body_names``, shape (num_envs, bodies, 7).
+    #[getter]
+    fn body_poses<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        Ok(self.shared.read(py, |sim| Ok(sim.mjcf_part(self.id).body_poses()))?.into_pyarray(py).into_any())
     }
 
     /// Poses of a body in the environment, shape (num_envs, 7).

@@ -5,11 +5,13 @@ use crate::errors::{Class, Failure};
 use crate::shared::{Entity, Shared, detached};
 use crate::simulation::Simulation;
 use kinetoscope::prelude::Record as _;
-use kinetoscope::record::{self, FieldSelector, Format, OverviewCfg, RecorderCfg, RecorderId, Recording};
+use kinetoscope::record::{
+    self, FieldSelector, Format, FoxgloveCfg, OverviewCfg, RecorderCfg, RecorderId, Recording, StreamToFoxglove as _,
+};
 use kinetoscope::sim::EnvId;
 use numpy::{IntoPyArray, PyArray1};
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyString};
+use pyo3::types::{PyDict, PyMapping, PyString};
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -196,11 +198,11 @@ impl Simulation {
         &self,
         py: Python<'_>,
         path: PathBuf,
-        topics: Option<Vec<Bound<'_, PyAny>>>,
+        topics: Option<&Bound<'_, PyAny>>,
         format: Option<&str>,
         env_ids: Option<&Bound<'_, PyAny>>,
         period_steps: u64,
-        stream_periods: Option<&Bound<'_, PyDict>>,
+        stream_periods: Option<&Bound<'_, PyAny>>,
         scene: bool,
         overview_size: Option<[usize; 2]>,
         overview_fps: Option<f64>,
@@ -208,26 +210,15 @@ impl Simulation {
         overwrite: bool,
     ) -> PyResult<Recorder> {
         let defaults = RecorderCfg::default();
-        let periods = stream_periods.map(|periods| {
-            periods
-                .iter()
-                .map(|(name, period)| Ok((name.extract()?, period.extract()?)))
-                .collect::<PyResult<Vec<(String, u64)>>>()
-        });
-        let overview = OverviewCfg {
-            size: overview_size.unwrap_or(defaults.overview.size),
-            fps: overview_fps.unwrap_or(defaults.overview.fps),
-            ..defaults.overview.clone()
-        };
         let cfg = RecorderCfg {
             path: path.clone(),
             format: format.map(format_of).transpose()?,
-            topics: topics.map_or(Ok(defaults.topics.clone()), |topics| topics.iter().map(topic_of).collect())?,
+            topics: topics.map_or(Ok(defaults.topics.clone()), topics_of)?,
             envs: envs(&self.shared, env_ids)?,
             period_steps,
-            stream_periods: periods.transpose()?.unwrap_or_default(),
+            stream_periods: stream_periods.map_or(Ok(Vec::new()), periods_of)?,
             scene,
-            overview,
+            overview: overview(&defaults.overview, overview_size, overview_fps),
             task: task.unwrap_or_default(),
             overwrite,
             ..defaults
@@ -247,6 +238,108 @@ impl Simulation {
         dict.set_item("difference", result.difference.map(|difference| format!("{difference:?}")))?;
         Ok(dict)
     }
+}
+
+/// A live stream to Foxglove. It ends when it is closed, or with the simulation.
+#[pyclass(frozen, module = "kinetoscope")]
+#[derive(Debug)]
+pub(crate) struct FoxgloveServer {
+    shared: Arc<Shared>,
+    inner: record::FoxgloveServer,
+}
+
+#[pymethods]
+impl FoxgloveServer {
+    /// Address for Foxglove's dialog "Open connection", such as ``"ws://127.0.0.1:8765"``.
+    #[getter]
+    fn url(&self) -> String {
+        self.inner.url()
+    }
+
+    /// Number of connected clients.
+    #[getter]
+    fn clients(&self) -> usize {
+        self.inner.clients()
+    }
+
+    /// Error that stopped the stream, or None.
+    #[getter]
+    fn failure(&self, py: Python<'_>) -> PyResult<Option<String>> {
+        self.shared.read(py, |sim| Ok(self.inner.failure(sim)?))
+    }
+
+    /// Number of rows that were dropped because the writer thread was too slow.
+    #[getter]
+    fn dropped_rows(&self, py: Python<'_>) -> PyResult<u64> {
+        self.shared.read(py, |sim| Ok(self.inner.dropped_rows(sim)?))
+    }
+
+    /// Disconnects all clients and stops listening.
+    fn close(&self, py: Python<'_>) -> PyResult<()> {
+        self.shared.write(py, |sim| Ok(self.inner.close(sim)?))
+    }
+
+    fn __repr__(&self) -> String {
+        format!("<FoxgloveServer {}>", self.inner.url())
+    }
+}
+
+#[pymethods]
+impl Simulation {
+    /// Streams topics to Foxglove while the simulation steps; port 0 selects a free port. An address such as
+    /// ``"0.0.0.0:8765"`` lets other machines read them: the server has no token. Keyword arguments are the fields of the
+    /// Rust ``FoxgloveCfg``.
+    #[pyo3(signature = (address="127.0.0.1:8765", topics=None, *, env_ids=None, period_steps=1, stream_periods=None,
+        overview_size=None, overview_fps=None))]
+    #[expect(clippy::too_many_arguments, reason = "keyword arguments of a Python method")]
+    fn stream_to_foxglove(
+        &self,
+        py: Python<'_>,
+        address: &str,
+        topics: Option<&Bound<'_, PyAny>>,
+        env_ids: Option<&Bound<'_, PyAny>>,
+        period_steps: u64,
+        stream_periods: Option<&Bound<'_, PyAny>>,
+        overview_size: Option<[usize; 2]>,
+        overview_fps: Option<f64>,
+    ) -> PyResult<FoxgloveServer> {
+        let defaults = FoxgloveCfg::at(address).map_err(Failure::from)?;
+        let cfg = FoxgloveCfg {
+            topics: topics.map_or(Ok(defaults.topics.clone()), topics_of)?,
+            envs: envs(&self.shared, env_ids)?,
+            period_steps,
+            stream_periods: stream_periods.map_or(Ok(Vec::new()), periods_of)?,
+            overview: overview(&defaults.overview, overview_size, overview_fps),
+            ..defaults
+        };
+        let inner = self.shared.write_with_threads(py, |sim| Ok(sim.stream_to_foxglove(cfg)?))?;
+        Ok(FoxgloveServer { shared: Arc::clone(&self.shared), inner })
+    }
+}
+
+/// Settings of an overview image, with those that are given.
+fn overview(defaults: &OverviewCfg, size: Option<[usize; 2]>, fps: Option<f64>) -> OverviewCfg {
+    OverviewCfg { size: size.unwrap_or(defaults.size), fps: fps.unwrap_or(defaults.fps), ..defaults.clone() }
+}
+
+/// Topics of an argument: one, or a sequence of them.
+fn topics_of(topics: &Bound<'_, PyAny>) -> PyResult<Vec<record::Topic>> {
+    if topics.is_instance_of::<PyString>() || topics.is_instance_of::<Topic>() {
+        return Ok(vec![topic_of(topics)?]);
+    }
+    let items = topics.try_iter().map_err(|_| {
+        let found = topics.get_type().name().map_or_else(|_| String::new(), |name| name.to_string());
+        Failure::argument("topics", format!("expected a topic or a list of topics, not {found}"))
+    })?;
+    items.map(|topic| topic_of(&topic?)).collect()
+}
+
+/// Periods of single streams, from a dict of steps by stream.
+fn periods_of(periods: &Bound<'_, PyAny>) -> PyResult<Vec<(String, u64)>> {
+    let periods = periods.cast::<PyMapping>().map_err(|_| {
+        Failure::argument("stream_periods", "expected a dict of steps by stream, such as {\"camera/rgb\": 10}")
+    })?;
+    periods.items()?.iter().map(|item| item.extract()).collect()
 }
 
 fn topic_of(topic: &Bound<'_, PyAny>) -> PyResult<record::Topic> {

@@ -1,16 +1,18 @@
 //! Robots and passive articulations.
 
-use crate::arguments::{Selection, array, envs};
+use crate::arguments::{Selection, array, envs, patterns};
 use crate::cfg;
 use crate::errors::Failure;
-use crate::shared::Shared;
+use crate::shared::{Shared, equal_handles};
 use kinetoscope::ndarray::{Array2, Ix2, Ix3};
+use kinetoscope::robot::description::{Joint, Link, LinkId};
 use kinetoscope::robot::kinematics::{IkCfg, TipFrame};
 use kinetoscope::scene::Pose;
 use kinetoscope::scene::pose::from_row;
 use kinetoscope::sim::{DriveType, RobotId, WrenchFrame};
 use numpy::IntoPyArray;
 use pyo3::prelude::*;
+use pyo3::types::PyDict;
 use std::sync::Arc;
 
 /// A robot or a passive articulation in all environments.
@@ -293,6 +295,34 @@ impl Robot {
         })
     }
 
+    /// Structure of the robot after merging its files: a dict of ``links`` (dicts with ``name``, ``mass`` [kg], None without
+    /// an inertia) and ``joints``, fixed ones included (dicts with ``name``, ``type`` as in URDF, ``parent`` and ``child``,
+    /// names of links, and ``axis`` in the frame of the joint).
+    #[getter]
+    fn description<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let description = self.shared.read(py, |sim| Ok(sim.robot(self.id).description().clone()))?;
+        let link = |link: &Link| {
+            let dict = PyDict::new(py);
+            dict.set_item("name", &link.name)?;
+            dict.set_item("mass", link.inertial.as_ref().map(|inertial| inertial.mass))?;
+            Ok(dict)
+        };
+        let name = |link: LinkId| description.links.get(link.0).map(|link| link.name.as_str());
+        let joint = |joint: &Joint| {
+            let dict = PyDict::new(py);
+            dict.set_item("name", &joint.name)?;
+            dict.set_item("type", joint.kind.name())?;
+            dict.set_item("parent", name(joint.parent))?;
+            dict.set_item("child", name(joint.child))?;
+            dict.set_item("axis", (joint.axis.x, joint.axis.y, joint.axis.z))?;
+            Ok(dict)
+        };
+        let dict = PyDict::new(py);
+        dict.set_item("links", description.links.iter().map(link).collect::<PyResult<Vec<_>>>()?)?;
+        dict.set_item("joints", description.joints.iter().map(joint).collect::<PyResult<Vec<_>>>()?)?;
+        Ok(dict)
+    }
+
     /// Indices of the joints of a control part, or of all joints.
     #[pyo3(signature = (part=None))]
     fn joint_ids(&self, py: Python<'_>, part: Option<&str>) -> PyResult<Vec<usize>> {
@@ -306,14 +336,16 @@ impl Robot {
             .read(py, |sim| Ok(sim.robot(self.id).active_joint_ids(part)?.into_iter().map(|joint| joint.0).collect()))
     }
 
-    /// Indices of the joints whose names match one of the patterns, in the order of the joints.
-    fn find_joints(&self, py: Python<'_>, patterns: Vec<String>) -> PyResult<Vec<usize>> {
+    /// Indices of the joints whose names match a pattern, or one of several, in the order of the joints.
+    fn find_joints(&self, py: Python<'_>, patterns: &Bound<'_, PyAny>) -> PyResult<Vec<usize>> {
+        let patterns = self::patterns(patterns)?;
         self.shared
             .read(py, |sim| Ok(sim.robot(self.id).find_joints(&patterns)?.into_iter().map(|joint| joint.0).collect()))
     }
 
-    /// Indices of the links whose names match one of the patterns.
-    fn find_links(&self, py: Python<'_>, patterns: Vec<String>) -> PyResult<Vec<usize>> {
+    /// Indices of the links whose names match a pattern, or one of several.
+    fn find_links(&self, py: Python<'_>, patterns: &Bound<'_, PyAny>) -> PyResult<Vec<usize>> {
+        let patterns = self::patterns(patterns)?;
         self.shared
             .read(py, |sim| Ok(sim.robot(self.id).find_links(&patterns)?.into_iter().map(|link| link.0).collect()))
     }
@@ -522,23 +554,13 @@ impl Robot {
 
     /// Table of the joints and tree of the links, for notebooks.
     fn _repr_html_(&self, py: Python<'_>) -> PyResult<String> {
-        self.shared.read(py, |sim| Ok(crate::html::robot(&sim.robot(self.id))))
-    }
-
-    fn __eq__(&self, other: &Bound<'_, PyAny>) -> bool {
-        other.cast::<Self>().is_ok_and(|other| {
-            let other = other.get();
-            Arc::ptr_eq(&self.shared, &other.shared) && self.id == other.id
-        })
-    }
-
-    fn __hash__(&self) -> u64 {
-        use std::hash::{Hash as _, Hasher as _};
-        let mut hasher = std::hash::DefaultHasher::new();
-        self.id.hash(&mut hasher);
-        hasher.finish()
+        let html = self.shared.describe(py, "Robot", |sim| Ok(crate::html::robot(&sim.robot(self.id))))?;
+        // Of a destroyed simulation, and of one in use, this is a plain text.
+        Ok(if html.starts_with("<Robot") { crate::html::escape(&html) } else { html })
     }
 }
+
+equal_handles! { Robot: id }
 
 /// Result of ``Robot.compute_ik``, one entry for each environment.
 #[pyclass(frozen, get_all, module = "kinetoscope")]

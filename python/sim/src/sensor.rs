@@ -3,7 +3,7 @@
 use crate::arguments::{array, env_indices};
 use crate::channels::{Instant, names, values};
 use crate::errors::Failure;
-use crate::shared::Shared;
+use crate::shared::{Shared, equal_handles};
 use crate::values::{Values, read_into};
 use kinetoscope::ndarray::{Array2, ArrayD, Ix2, IxDyn};
 use kinetoscope::prelude::Intrinsics;
@@ -17,6 +17,8 @@ use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use std::any::Any;
 use std::sync::Arc;
+
+equal_handles! { Sensor: uid }
 
 /// A sensor in all environments. ``sensor["depth"]`` is a channel by name; ``sensor.channels`` lists the names.
 #[pyclass(frozen, module = "kinetoscope")]
@@ -280,18 +282,38 @@ impl Sensor {
         })
     }
 
+    /// Environments that a camera sees, one for each row of its channels.
+    #[getter]
+    fn env_ids(&self, py: Python<'_>) -> PyResult<Vec<usize>> {
+        self.shared.read(py, |sim| {
+            let sensor = sim.entities().sensor_by_uid(&self.uid)?;
+            let all = || (0..sim.num_envs()).collect();
+            Ok(camera_of(sensor).map_or_else(all, |camera| camera.env_ids().to_vec()))
+        })
+    }
+
+    /// Points seen by the pixels of a camera with the channel ``depth`` in one environment [m], shape (height, width, 3),
+    /// infinite without a hit. ``frame`` is ``"camera"`` or ``"world"`` (the environment).
+    #[pyo3(signature = (env=0, frame="world"))]
+    fn point_map<'py>(&self, py: Python<'py>, env: usize, frame: &str) -> PyResult<Bound<'py, PyAny>> {
+        let frame = point_frame(frame)?;
+        let points: Values<'_> = self.shared.read(py, |sim| {
+            let sensor = sim.entities().sensor_by_uid(&self.uid)?;
+            let any: &dyn Any = sensor;
+            if let Some(camera) = any.downcast_ref::<RayCasterCamera>() {
+                return Ok(camera.point_map(env, frame)?.into());
+            }
+            let camera = camera_of(sensor).ok_or_else(|| not_a_camera(&self.uid))?;
+            Ok(camera.point_map(env, frame)?.into())
+        })?;
+        Ok(points.into_python(py))
+    }
+
     /// Points seen by a camera with the channel ``depth`` in one environment [m], shape (points, 3). ``frame`` is
     /// ``"camera"`` or ``"world"`` (the environment).
     #[pyo3(signature = (env=0, frame="world"))]
     fn point_cloud<'py>(&self, py: Python<'py>, env: usize, frame: &str) -> PyResult<Bound<'py, PyAny>> {
-        let frame = match frame {
-            "camera" => PointFrame::Camera,
-            "world" => PointFrame::World,
-            other => {
-                let message = format!("unknown frame {other:?}; \"camera\" or \"world\"");
-                return Err(Failure::argument("frame", message).into());
-            }
-        };
+        let frame = point_frame(frame)?;
         let points: Values<'_> = self.shared.read(py, |sim| {
             let sensor = sim.entities().sensor_by_uid(&self.uid)?;
             let any: &dyn Any = sensor;
@@ -383,7 +405,7 @@ pub(crate) fn id_of<S: kinetoscope::sensors::Sensor>(sim: &SimulationManager, ui
 }
 
 /// The camera that a sensor is, or the left one of a stereo camera.
-fn camera_of(sensor: &dyn kinetoscope::sensors::Sensor) -> Option<&Camera> {
+pub(crate) fn camera_of(sensor: &dyn kinetoscope::sensors::Sensor) -> Option<&Camera> {
     let any: &dyn Any = sensor;
     any.downcast_ref().or_else(|| any.downcast_ref::<StereoCamera>().map(StereoCamera::left))
 }
@@ -420,7 +442,7 @@ fn kind(sensor: &dyn kinetoscope::sensors::Sensor) -> &'static str {
     "sensor"
 }
 
-fn not_a_camera(uid: &str) -> Failure {
+pub(crate) fn not_a_camera(uid: &str) -> Failure {
     Failure::argument(uid, "this sensor is not a camera")
 }
 
@@ -432,6 +454,17 @@ fn axes(name: &str) -> PyResult<CameraConvention> {
         other => {
             let message = format!("unknown convention {other:?}; \"ros\", \"opengl\" or \"world\"");
             Err(Failure::argument("convention", message).into())
+        }
+    }
+}
+
+fn point_frame(name: &str) -> PyResult<PointFrame> {
+    match name {
+        "camera" => Ok(PointFrame::Camera),
+        "world" => Ok(PointFrame::World),
+        other => {
+            let message = format!("unknown frame {other:?}; \"camera\" or \"world\"");
+            Err(Failure::argument("frame", message).into())
         }
     }
 }

@@ -7,6 +7,7 @@ use crate::errors::{Class, Failure};
 use kinetoscope::sim::{MjcfId, RigidObjectGroupId, RigidObjectId, RobotId, SimulationManager, TerrainId, WeldId};
 use kinetoscope::tasks::Env;
 use pyo3::prelude::*;
+use std::hash::{DefaultHasher, Hash, Hasher as _};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, TryLockError};
@@ -246,6 +247,13 @@ impl Shared {
         })
     }
 
+    /// Hash of a handle of this simulation, with its numbers.
+    pub(crate) fn hash(self: &Arc<Self>, handle: impl Hash) -> u64 {
+        let mut hasher = DefaultHasher::new();
+        (Arc::as_ptr(self), handle).hash(&mut hasher);
+        hasher.finish()
+    }
+
     /// Registers an entity under its name.
     pub(crate) fn register(&self, name: &str, entity: Entity) {
         self.entities().push((name.into(), entity));
@@ -276,6 +284,25 @@ impl Shared {
         self.entities.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
+
+/// Declares equality of handles: handles of the same simulation with the same numbers are equal.
+macro_rules! equal_handles {
+    ($($Class:ident $(: $number:ident)?),*) => {
+        $(#[pymethods]
+        impl $Class {
+            fn __eq__(&self, other: &Bound<'_, PyAny>) -> bool {
+                other.cast::<Self>().is_ok_and(|other| {
+                    Arc::ptr_eq(&self.shared, &other.get().shared) $(&& self.$number == other.get().$number)?
+                })
+            }
+
+            fn __hash__(&self) -> u64 {
+                self.shared.hash(($(&self.$number,)?))
+            }
+        })*
+    };
+}
+pub(crate) use equal_handles;
 
 impl Drop for Shared {
     fn drop(&mut self) {

@@ -6,7 +6,7 @@ use crate::errors::{Class, Failure};
 use crate::objects::{MjcfPart, RigidObject, RigidObjectGroup, Terrain, Weld};
 use crate::robot::Robot;
 use crate::sensor::Sensor;
-use crate::shared::{Entity, Shared, detached, guarded};
+use crate::shared::{Entity, Shared, detached, equal_handles, guarded};
 use crate::snapshot::Snapshot;
 use kinetoscope::ndarray::{Ix2, Ix3};
 use kinetoscope::prelude::{ArticulationCfg, MjcfPartCfg, RigidObjectCfg, RobotCfg, SceneCfg, TerrainCfg};
@@ -32,6 +32,8 @@ use std::time::{Duration, Instant};
 pub(crate) struct Simulation {
     pub(crate) shared: Arc<Shared>,
 }
+
+equal_handles! { Simulation }
 
 /// Wall time of a block of steps, after which signals are handled.
 const BLOCK: Duration = Duration::from_millis(50);
@@ -168,6 +170,9 @@ impl Simulation {
     /// Adds a sensor under a name and returns its handle. ``cfg`` is a configuration such as ``CameraCfg``, or a dict
     /// with ``type``.
     fn add_sensor(&self, py: Python<'_>, name: String, cfg: &Bound<'_, PyAny>) -> PyResult<Py<PyAny>> {
+        if let Some(kind) = cfg::type_of(cfg)? {
+            cfg::check_sensor(py, &kind)?;
+        }
         self.add(py, name, cfg)
     }
 
@@ -388,9 +393,9 @@ impl Simulation {
         let is_list = randomization.try_iter().is_ok() && !randomization.is_instance_of::<PyDict>();
         let randomization: Randomization = if is_list {
             terms.set_item("terms", randomization.try_iter()?.collect::<PyResult<Vec<_>>>()?)?;
-            cfg::read("randomization", Some(terms.as_any()))?
+            cfg::read("Randomization", Some(terms.as_any()))?
         } else {
-            cfg::read("randomization", Some(randomization))?
+            cfg::read("Randomization", Some(randomization))?
         };
         let env_ids = envs(&self.shared, env_ids)?;
         self.shared.write(py, |sim| Ok(sim.properties_mut().randomize(&randomization, env_ids.as_deref())?))

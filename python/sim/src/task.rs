@@ -3,7 +3,7 @@
 use crate::arguments::array;
 use crate::cfg;
 use crate::errors::{Class, Failure};
-use crate::shared::Shared;
+use crate::shared::{Shared, equal_handles};
 use crate::simulation::Simulation;
 use crate::values::Values;
 use kinetoscope::ndarray::{Array1, Ix1, Ix2};
@@ -32,6 +32,8 @@ pub(crate) struct Task {
     /// True for observations in single precision.
     is_single: bool,
 }
+
+equal_handles! { Task: number }
 
 /// Observations, rewards, terminated, truncated, and the dict of everything else.
 type StepResult<'py> = (Bound<'py, PyAny>, Bound<'py, PyAny>, Bound<'py, PyAny>, Bound<'py, PyAny>, Bound<'py, PyDict>);

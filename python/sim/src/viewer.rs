@@ -77,8 +77,10 @@ impl Window {
 #[pymethods]
 impl Simulation {
     /// Serves the simulation to browsers; port 0 selects a free port. ``speed`` is simulated seconds per second, or
-    /// None for no limit.
-    #[pyo3(signature = (address="127.0.0.1:0", *, speed=None, max_fps=None, max_viewers=None, jpeg_quality=None))]
+    /// None for no limit. ``allow_local_frames`` lets web pages of this machine show the view in a frame, as notebooks do.
+    #[pyo3(signature = (address="127.0.0.1:0", *, speed=None, max_fps=None, max_viewers=None, jpeg_quality=None,
+        allow_local_frames=false))]
+    #[expect(clippy::too_many_arguments, reason = "keyword arguments of a Python method")]
     fn serve(
         &self,
         py: Python<'_>,
@@ -87,6 +89,7 @@ impl Simulation {
         max_fps: Option<f64>,
         max_viewers: Option<usize>,
         jpeg_quality: Option<u8>,
+        allow_local_frames: bool,
     ) -> PyResult<Server> {
         let defaults = ServeCfg::default();
         let cfg = ServeCfg {
@@ -94,6 +97,7 @@ impl Simulation {
             max_fps: max_fps.unwrap_or(defaults.max_fps),
             max_viewers: max_viewers.unwrap_or(defaults.max_viewers),
             jpeg_quality: jpeg_quality.unwrap_or(defaults.jpeg_quality),
+            allow_local_frames,
             ..defaults
         };
         let inner = self.shared.write_with_threads(py, |sim| Ok(sim.serve_with(address, cfg)?))?;
@@ -161,11 +165,12 @@ impl Simulation {
         Ok(image.map(|image| Values::from(image).into_python(py)))
     }
 
-    /// Browser view in a frame, for notebooks. The view stays open while the simulation exists.
+    /// Browser view in a frame, for notebooks whose browser runs on this machine. The view stays open while the
+    /// simulation exists.
     #[pyo3(signature = (width=960, height=540))]
     fn show(slf: &Bound<'_, Self>, width: u32, height: u32) -> PyResult<Py<PyAny>> {
         let py = slf.py();
-        let server = slf.get().serve(py, "127.0.0.1:0", None, None, None, None)?;
+        let server = slf.get().serve(py, "127.0.0.1:0", None, None, None, None, true)?;
         let frame = py.import("kinetoscope.notebook")?.getattr("Frame")?;
         frame.call1((server, width, height)).map(Bound::unbind)
     }

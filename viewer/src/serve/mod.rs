@@ -34,6 +34,7 @@ pub use kinetoscope_http::ServeError;
 use crate::control::{RecordButton, SnapshotRequest, Speed, ViewerExt};
 use kinetoscope_http::{AccessPolicy, Token, listen, parse_address, reachable_address};
 use kinetoscope_sim::{Observer, ObserverId, SimEvent, SimulationManager};
+use page::FrameAncestors;
 use serde::{Deserialize, Serialize};
 use server::{Server, ServerContext};
 use std::net::SocketAddr;
@@ -57,6 +58,10 @@ pub struct ServeCfg {
     /// Speed of simulated time until a viewer changes it, and again 10 s after the last viewer has left. `None` keeps
     /// the current speed: that set by a window, otherwise as fast as the machine can step.
     pub speed: Option<Speed>,
+    /// True to let web pages of this machine show the view in a frame, as notebooks do: pages of `localhost` and
+    /// `127.0.0.1` at any port. By default, browsers refuse to show the view in a frame, because a page with a frame can
+    /// lure users into clicks on it.
+    pub allow_local_frames: bool,
     /// Record button of the simulation. `None` keeps the button that another view has set, if any. Not part of files.
     #[serde(skip)]
     pub record_button: Option<RecordButton>,
@@ -64,7 +69,14 @@ pub struct ServeCfg {
 
 impl Default for ServeCfg {
     fn default() -> Self {
-        Self { max_viewers: 16, max_fps: 30.0, jpeg_quality: 85, speed: None, record_button: None }
+        Self {
+            max_viewers: 16,
+            max_fps: 30.0,
+            jpeg_quality: 85,
+            speed: None,
+            allow_local_frames: false,
+            record_button: None,
+        }
     }
 }
 
@@ -129,6 +141,7 @@ pub trait Serve {
 impl Serve for SimulationManager {
     fn serve_with(&mut self, address: &str, mut cfg: ServeCfg) -> Result<ServerHandle, ServeError> {
         let (button, max_viewers) = (cfg.record_button.take(), cfg.max_viewers);
+        let frames = if cfg.allow_local_frames { FrameAncestors::ThisMachine } else { FrameAncestors::None };
         let asked = parse_address(address, DEFAULT_PORT)?;
         let listener = listen(asked)?;
         let address = listener.local_addr().map_err(|error| ServeError::Listen { address: asked, error })?;
@@ -140,7 +153,7 @@ impl Serve for SimulationManager {
         // the program does not step then.
         let host_viewer = self.viewer(SnapshotRequest { rate: 2.0, ..SnapshotRequest::default() });
         let backend = Arc::new(ViewerHub::new(host_viewer, cfg));
-        let server = Server::start(listener, AccessPolicy::new(address, token), backend, max_viewers)?;
+        let server = Server::start(listener, AccessPolicy::new(address, token), frames, backend, max_viewers)?;
         button.into_iter().for_each(|button| self.set_record_button(button));
         let context = server.context();
         let host = self.observers_mut().add(ServerObserver(server));

@@ -16,11 +16,30 @@ fn html(nonce: &str) -> String {
     PAGE.replace("NONCE", nonce).replace("/*STYLE*/", STYLE).replace("/*PROGRAM*/", &PARTS.join("\n"))
 }
 
+/// Web pages that may show the page in a frame.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum FrameAncestors {
+    None,
+    ThisMachine,
+}
+
+impl FrameAncestors {
+    /// Sources of the directive `frame-ancestors` (Content Security Policy, level 3). It has no notation for IPv6
+    /// addresses.
+    fn sources(self) -> &'static str {
+        match self {
+            Self::None => "'none'",
+            Self::ThisMachine => "http://localhost:* https://localhost:* http://127.0.0.1:* https://127.0.0.1:*",
+        }
+    }
+}
+
 /// Sends the page with status 200.
-pub(super) fn send(stream: &mut TcpStream, nonce: &str, with_body: bool) {
+pub(super) fn send(stream: &mut TcpStream, nonce: &str, frames: FrameAncestors, with_body: bool) {
     let policy = format!(
         "default-src 'none'; script-src 'nonce-{nonce}'; style-src 'nonce-{nonce}'; connect-src 'self'; img-src blob: \
-         data:; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+         data:; base-uri 'none'; form-action 'none'; frame-ancestors {}",
+        frames.sources()
     );
     let more = [("Content-Security-Policy", policy.as_str()), ("Content-Type", "text/html; charset=utf-8")];
     kinetoscope_http::send(stream, "200 OK", &more, &html(nonce), with_body);

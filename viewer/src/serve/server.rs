@@ -1,5 +1,6 @@
 //! HTTP server with one thread per connection, and limits on the number of connections.
 
+use super::page::FrameAncestors;
 use super::view_backend::ViewBackend;
 use super::{page, websocket_session};
 use kinetoscope_http::{AccessPolicy, RequestHead, ServeError, Status, random_hex, send_error};
@@ -25,6 +26,7 @@ const WEBSOCKET_PATH: &str = "/live";
 /// State shared by all connections.
 pub(super) struct ServerContext {
     policy: AccessPolicy,
+    frames: FrameAncestors,
     backend: Arc<dyn ViewBackend>,
     max_viewers: usize,
     viewers: AtomicUsize,
@@ -67,6 +69,7 @@ impl Server {
     pub(super) fn start(
         listener: TcpListener,
         policy: AccessPolicy,
+        frames: FrameAncestors,
         backend: Arc<dyn ViewBackend>,
         max_viewers: usize,
     ) -> Result<Self, ServeError> {
@@ -74,6 +77,7 @@ impl Server {
         listener.set_nonblocking(true).map_err(failed("cannot make the socket non-blocking"))?;
         let context = Arc::new(ServerContext {
             policy,
+            frames,
             backend,
             max_viewers,
             viewers: AtomicUsize::new(0),
@@ -214,7 +218,7 @@ fn serve_connection(stream: &mut TcpStream, context: &ServerContext) {
     }
     match (head.method.as_str(), head.path.as_str()) {
         ("GET" | "HEAD", "/" | "/index.html") => match random_hex() {
-            Ok(nonce) => page::send(stream, &nonce, with_body),
+            Ok(nonce) => page::send(stream, &nonce, context.frames, with_body),
             Err(_) => send_error(stream, Status::InternalError, with_body),
         },
         ("GET", WEBSOCKET_PATH) => upgrade(stream, context, head),

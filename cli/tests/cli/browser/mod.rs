@@ -1,6 +1,7 @@
 //! The page of the browser view in Chromium: it shows the simulation and controls it.
 
 mod chromium;
+mod frames;
 mod video;
 
 use super::serve::running::{ServedSimulation, play_fall};

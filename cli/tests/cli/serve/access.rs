@@ -54,6 +54,23 @@ fn page() {
     assert_eq!(status_of(&post), 405, "{post}");
 }
 
+/// Pages that may show the view in a frame: none by default, those of this machine on request.
+#[test]
+fn frames() {
+    for (allow_local_frames, expected) in
+        [(false, "'none'"), (true, "http://localhost:* https://localhost:* http://127.0.0.1:* https://127.0.0.1:*")]
+    {
+        let cfg = ServeCfg { allow_local_frames, ..ServeCfg::default() };
+        let running = ServedSimulation::start_at(1, "127.0.0.1:0", cfg);
+        let answer = exchange(running.address, b"HEAD / HTTP/1.1\r\nHost: localhost\r\n\r\n");
+        let policy = answer.lines().find_map(|line| line.strip_prefix("Content-Security-Policy: ")).unwrap();
+        let ancestors = policy.split("; ").find_map(|rule| rule.strip_prefix("frame-ancestors ")).unwrap();
+        assert_eq!(ancestors, expected);
+        // Other headers would restrict frames, too.
+        assert!(!answer.to_ascii_lowercase().contains("x-frame-options"), "{answer}");
+    }
+}
+
 #[test]
 fn other_sites() {
     let running = ServedSimulation::start(1);

@@ -61,4 +61,8 @@ class AppLauncher:
         group.add_argument("--device", type=str, default="cpu", help="cpu")
         group.add_argument("--cpu", action="store_true", default=False, help="ignored")
         group.add_argument("--verbose", action="store_true", default=False, help="ignored")
+        group.add_argument("--info", action="store_true", default=False, help="ignored")
         group.add_argument("--experience", type=str, default="", help="ignored")
+        group.add_argument("--rendering_mode", type=str, default=None, help="ignored")
+        group.add_argument("--kit_args", type=str, default="", help="ignored")
+        group.add_argument("--xr", action="store_true", default=False, help="ignored")

@@ -7,7 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from .._tensors import array
+from .._layer import Layer
+from .._poses import to_matrix
+from .._tensors import array, tensor
 from ..configclass import configclass
 
 
@@ -29,7 +31,7 @@ def ids_of(values: Any, count: int) -> Any:
     return None if values is None else array(values)
 
 
-class RootData(ABC):
+class RootData(Layer, ABC):
     """State of an asset with a root, as tensors in the world frame: position, rotation w x y z, linear and angular velocity."""
 
     @property
@@ -70,8 +72,33 @@ class RootData(ABC):
     def body_quat_w(self) -> Any:
         return self.body_state_w[..., 3:7]
 
+    @property
+    def body_vel_w(self) -> Any:
+        return self.body_state_w[..., 7:13]
 
-class RootAsset(ABC):
+    @property
+    def body_lin_vel_w(self) -> Any:
+        return self.body_state_w[..., 7:10]
+
+    @property
+    def body_ang_vel_w(self) -> Any:
+        return self.body_state_w[..., 10:13]
+
+    @property
+    def root_lin_vel_b(self) -> Any:
+        return self._in_root_axes(self.root_lin_vel_w)
+
+    @property
+    def root_ang_vel_b(self) -> Any:
+        return self._in_root_axes(self.root_ang_vel_w)
+
+    def _in_root_axes(self, vectors: Any) -> Any:
+        """Vectors in world axes, shape (N, 3), in the axes of the root."""
+        axes = to_matrix(array(self.root_state_w)[:, :7])[:, :3, :3]
+        return tensor(np.einsum("nij,ni->nj", axes, np.broadcast_to(array(vectors), (len(axes), 3))))
+
+
+class RootAsset(Layer, ABC):
     """An asset with a root, in environments with these origins."""
 
     def __init__(self, origins: Any) -> None:

@@ -12,10 +12,11 @@ import numpy as np
 
 from ..._sim import Robot
 from ...errors import ConfigError
-from .._poses import to_matrix, to_world
+from .._poses import to_world
 from .._tensors import array, tensor
 from ..configclass import configclass
 from .asset_base import AssetBaseCfg, RootAsset, RootData, ids_of
+from .names import resolve
 from .rigid_object import RigidObject, RigidObjectCfg
 
 __all__ = ["Articulation", "ArticulationCfg", "AssetBaseCfg", "RigidObject", "RigidObjectCfg"]
@@ -174,8 +175,49 @@ class ArticulationData(RootData):
         return tensor(self._native.qf)
 
     @property
+    def joint_effort_target(self) -> Any:
+        return tensor(self._native.qf_target)
+
+    @property
+    def joint_stiffness(self) -> Any:
+        return tensor(self._native.stiffness)
+
+    @property
+    def joint_damping(self) -> Any:
+        return tensor(self._native.damping)
+
+    @property
+    def joint_armature(self) -> Any:
+        return tensor(self._native.armature)
+
+    @property
+    def joint_friction(self) -> Any:
+        return tensor(self._native.friction)
+
+    @property
+    def joint_pos_limits(self) -> Any:
+        """Lower and upper limits, shape (N, J, 2)."""
+        return tensor(self._native.qpos_limits)
+
+    @property
+    def joint_limits(self) -> Any:
+        return self.joint_pos_limits
+
+    @property
+    def joint_vel_limits(self) -> Any:
+        return tensor(self._native.qvel_limits)
+
+    @property
+    def joint_effort_limits(self) -> Any:
+        return tensor(self._native.qf_limits)
+
+    @property
     def soft_joint_pos_limits(self) -> Any:
         return tensor(self._native.soft_qpos_limits)
+
+    @property
+    def soft_joint_vel_limits(self) -> Any:
+        return self.joint_vel_limits
 
     @property
     def root_state_w(self) -> Any:
@@ -183,9 +225,34 @@ class ArticulationData(RootData):
         return tensor(to_world(states, self._origins))
 
     @property
-    def root_lin_vel_b(self) -> Any:
-        axes = to_matrix(self._native.root_pose)[:, :3, :3]
-        return tensor(np.einsum("nij,ni->nj", axes, self._native.root_com_velocity[:, :3]))
+    def root_link_state_w(self) -> Any:
+        """Pose of the root link and velocity of its origin, shape (N, 13)."""
+        return tensor(to_world(self._native.root_state, self._origins))
+
+    @property
+    def root_link_pose_w(self) -> Any:
+        return self.root_link_state_w[:, :7]
+
+    @property
+    def root_link_pos_w(self) -> Any:
+        return self.root_link_state_w[:, :3]
+
+    @property
+    def root_link_quat_w(self) -> Any:
+        return self.root_link_state_w[:, 3:7]
+
+    @property
+    def root_link_vel_w(self) -> Any:
+        return self.root_link_state_w[:, 7:13]
+
+    @property
+    def root_com_pos_w(self) -> Any:
+        """Center of mass of the root link, shape (N, 3)."""
+        return tensor(to_world(self._native.root_com_position, self._origins))
+
+    @property
+    def root_com_vel_w(self) -> Any:
+        return self.root_vel_w
 
     @property
     def root_ang_vel_b(self) -> Any:
@@ -231,14 +298,19 @@ class Articulation(RootAsset):
     def body_names(self) -> list[str]:
         return self.native.link_names
 
-    def find_joints(self, name_keys: Any) -> tuple[list[int], list[str]]:
-        """Indices and names of the joints that match a pattern or a list of patterns."""
-        found = self.native.find_joints([name_keys] if isinstance(name_keys, str) else list(name_keys))
-        return found, [self.native.joint_names[index] for index in found]
+    @property
+    def is_fixed_base(self) -> bool:
+        return bool(self.cfg.spawn.fix_base)
 
-    def find_bodies(self, name_keys: Any) -> tuple[list[int], list[str]]:
-        found = self.native.find_links([name_keys] if isinstance(name_keys, str) else list(name_keys))
-        return found, [self.native.link_names[index] for index in found]
+    def find_joints(
+        self, name_keys: Any, joint_subset: Sequence[str] | None = None, preserve_order: bool = False
+    ) -> tuple[list[int], list[str]]:
+        """Indices and names of the joints that match a pattern or a list of patterns. As in Isaac, indices are those in
+        ``joint_subset``, if it is given."""
+        return resolve(name_keys, self.joint_names if joint_subset is None else joint_subset, preserve_order, "joint")
+
+    def find_bodies(self, name_keys: Any, preserve_order: bool = False) -> tuple[list[int], list[str]]:
+        return resolve(name_keys, self.body_names, preserve_order, "body")
 
     def _write_root_pose(self, poses: Any, env_ids: Any) -> None:
         self.native.write_root_pose(poses, env_ids)
@@ -248,6 +320,43 @@ class Articulation(RootAsset):
 
     def write_joint_state_to_sim(self, position: Any, velocity: Any, joint_ids: Any = None, env_ids: Any = None) -> None:
         self.native.write_joint_state(array(position), array(velocity), ids_of(joint_ids, self.num_joints), ids_of(env_ids, self.num_instances))
+
+    def write_joint_position_to_sim(self, position: Any, joint_ids: Any = None, env_ids: Any = None) -> None:
+        self._write("write_qpos", position, joint_ids, env_ids)
+
+    def write_joint_velocity_to_sim(self, velocity: Any, joint_ids: Any = None, env_ids: Any = None) -> None:
+        self._write("write_qvel", velocity, joint_ids, env_ids)
+
+    def write_joint_stiffness_to_sim(self, stiffness: Any, joint_ids: Any = None, env_ids: Any = None) -> None:
+        self._write("set_stiffness", stiffness, joint_ids, env_ids)
+
+    def write_joint_damping_to_sim(self, damping: Any, joint_ids: Any = None, env_ids: Any = None) -> None:
+        self._write("set_damping", damping, joint_ids, env_ids)
+
+    def write_joint_effort_limit_to_sim(self, limits: Any, joint_ids: Any = None, env_ids: Any = None) -> None:
+        self._write("set_qf_limits", limits, joint_ids, env_ids)
+
+    def write_joint_velocity_limit_to_sim(self, limits: Any, joint_ids: Any = None, env_ids: Any = None) -> None:
+        self._write("set_qvel_limits", limits, joint_ids, env_ids)
+
+    def write_joint_armature_to_sim(self, armature: Any, joint_ids: Any = None, env_ids: Any = None) -> None:
+        self._write("set_armature", armature, joint_ids, env_ids)
+
+    def write_joint_friction_to_sim(self, joint_friction: Any, joint_ids: Any = None, env_ids: Any = None) -> None:
+        self._write("set_friction", joint_friction, joint_ids, env_ids)
+
+    def write_joint_position_limit_to_sim(self, limits: Any, joint_ids: Any = None, env_ids: Any = None) -> None:
+        """Lower and upper limits, shape (n, joints, 2)."""
+        self._write("set_qpos_limits", limits, joint_ids, env_ids)
+
+    write_joint_limits_to_sim = write_joint_position_limit_to_sim
+
+    def _write(self, writer: str, values: Any, joint_ids: Any, env_ids: Any) -> None:
+        """Calls a writer of this package at once. A number stands for all joints."""
+        values, joints = array(values), ids_of(joint_ids, self.num_joints)
+        if values.ndim == 0:
+            values = np.full((1, self.num_joints if joints is None else np.atleast_1d(joints).size), float(values))
+        getattr(self.native, writer)(values, joints, ids_of(env_ids, self.num_instances))
 
     def set_joint_position_target(self, target: Any, joint_ids: Any = None, env_ids: Any = None) -> None:
         self._set("set_qpos_target", "qpos_target", target, joint_ids, env_ids)

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-import re
 from typing import Any
 
 import numpy as np
 
 from ..._sim import RigidObject as NativeRigidObject
-from .._poses import to_world
+from .._poses import to_matrix, to_world
 from .._tensors import array, tensor
 from ..configclass import configclass
 from .asset_base import AssetBaseCfg, RootAsset, RootData, ids_of
+from .names import resolve
+from .sim import SimulationContext
 from .spawners import shape
 
 
@@ -49,6 +50,9 @@ class RigidObjectData(RootData):
         start = cfg.init_state
         row = np.array([*start.pos, *start.rot, *start.lin_vel, *start.ang_vel], dtype=float)
         self.default_root_state = tensor(np.tile(row, (len(origins), 1)))
+        context = SimulationContext.instance()
+        gravity = np.array((0.0, 0.0, -9.81) if context is None else context.cfg.gravity, dtype=float)
+        self._down = gravity / max(float(np.linalg.norm(gravity)), 1e-12)
 
     @property
     def root_state_w(self) -> Any:
@@ -58,6 +62,17 @@ class RigidObjectData(RootData):
     @property
     def body_state_w(self) -> Any:
         return self.root_state_w[:, None]
+
+    @property
+    def projected_gravity_b(self) -> Any:
+        """Direction of gravity in the axes of the object, shape (N, 3)."""
+        return self._in_root_axes(self._down)
+
+    @property
+    def heading_w(self) -> Any:
+        """Yaw of the x axis of the object [rad], shape (N,)."""
+        axes = to_matrix(self._native.pose)
+        return tensor(np.arctan2(axes[:, 1, 0], axes[:, 0, 0]))
 
 
 class RigidObject(RootAsset):
@@ -78,13 +93,9 @@ class RigidObject(RootAsset):
         """The last part of the path."""
         return [self.cfg.prim_path.rsplit("/", 1)[-1]]
 
-    def find_bodies(self, name_keys: Any, preserve_order: bool = False) -> tuple[list[int], list[str]]:  # noqa: ARG002
+    def find_bodies(self, name_keys: Any, preserve_order: bool = False) -> tuple[list[int], list[str]]:
         """Index and name of the body, which each pattern must match."""
-        patterns = [name_keys] if isinstance(name_keys, str) else list(name_keys)
-        for pattern in patterns:
-            if not re.fullmatch(pattern, self.body_names[0]):
-                raise ValueError(f"no body matches {pattern!r}; bodies: {self.body_names[0]}")
-        return [0], self.body_names
+        return resolve(name_keys, self.body_names, preserve_order, "body")
 
     def _write_root_pose(self, poses: Any, env_ids: Any) -> None:
         self.native.write_pose(poses, env_ids)

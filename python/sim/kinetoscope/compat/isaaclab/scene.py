@@ -11,6 +11,7 @@ from ... import SimulationManager
 from ... import cfg as native
 from ...errors import ConfigError
 from .. import unsupported
+from .._layer import Layer
 from .._tensors import array, tensor
 from ..configclass import MISSING, configclass, fields_of
 from .asset_base import AssetBaseCfg
@@ -48,7 +49,7 @@ class InteractiveSceneCfg:
     replicate_physics: bool = True
 
 
-class InteractiveScene:
+class InteractiveScene(Layer):
     """A running scene. ``native`` is the simulation of this package, with the preset for legged robots."""
 
     def __init__(self, cfg: InteractiveSceneCfg) -> None:
@@ -98,6 +99,7 @@ class InteractiveScene:
         for asset in self._assets():
             asset.write_start()
         context.attach(self.native)
+        self._context = context
 
     def _assets(self) -> list[Any]:
         return [*self.articulations.values(), *self.rigid_objects.values()]
@@ -236,6 +238,11 @@ class InteractiveScene:
     def env_origins(self) -> Any:
         """Origins of the environments [m], shape (n, 3)."""
         return tensor(self._origins)
+
+    @property
+    def physics_dt(self) -> float:
+        """Time step [s]."""
+        return self._context.get_physics_dt()
 
     def __getitem__(self, name: str) -> Any:
         for entities in (self.articulations, self.rigid_objects, self.sensors, self.extras):

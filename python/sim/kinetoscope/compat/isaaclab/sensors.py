@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-import re
 from typing import Any
 
 import numpy as np
 
 from ..._sim import Sensor
-from .._poses import to_world
+from .._layer import Layer
+from .._poses import to_row, to_world
 from .._tensors import array, tensor
 from ..configclass import configclass
 from . import patterns
+from .names import resolve
 from .sim import PinholeCameraCfg
 
 __all__ = [
@@ -132,7 +133,7 @@ class ImuCfg(SensorBaseCfg):
     gravity_bias: Any = (0.0, 0.0, 9.81)
 
 
-class _Sensor:
+class _Sensor(Layer):
     """A sensor. ``native`` is the sensor of this package, which measures in every step at which it is due."""
 
     def __init__(self, native: Sensor, origins: Any, cfg: Any) -> None:
@@ -150,12 +151,17 @@ class _Sensor:
     def update(self, dt: float, force_recompute: bool = False) -> None:
         """Does nothing: the simulation updates its sensors."""
 
+    def set_debug_vis(self, debug_vis: bool) -> bool:
+        """Shows or hides the markers of the sensor."""
+        self.native.set_debug_vis(debug_vis)
+        return True
+
     def reset(self, env_ids: Any = None) -> None:
         """Not supported for one sensor: ``InteractiveScene.reset`` clears the buffers of all."""
         raise NotImplementedError(f"{type(self).__name__}.reset: use InteractiveScene.reset, which clears all sensors")
 
 
-class CameraData:
+class CameraData(Layer):
     """Images and poses of a camera."""
 
     def __init__(self, sensor: Camera) -> None:
@@ -221,7 +227,35 @@ class Camera(_Sensor):
         self.native.set_world_poses(rows, None if env_ids is None else array(env_ids), convention)
 
 
-class RayCasterData:
+    def set_world_poses_from_view(self, eyes: Any, targets: Any, env_ids: Any = None) -> None:
+        """Places the camera at ``eyes``, looking at ``targets``, in the world frame, shape (n, 3), with the vertical up."""
+        eyes, targets = (np.atleast_2d(np.asarray(array(values), dtype=float)) for values in (eyes, targets))
+        poses = np.array([view_pose(eye, target) for eye, target in zip(eyes, targets, strict=True)])
+        self.set_world_poses(poses[:, :3], poses[:, 3:], env_ids, "opengl")
+
+    def set_intrinsic_matrices(self, matrices: Any, focal_length: float = 1.0, env_ids: Any = None) -> None:  # noqa: ARG002
+        """Sets intrinsic matrices [pixels], shape (n, 3, 3). The focal length in units of length has no effect here."""
+        k = np.asarray(array(matrices), dtype=float).reshape(-1, 3, 3)
+        rows = np.stack([k[:, 0, 0], k[:, 1, 1], k[:, 0, 2], k[:, 1, 2]], axis=1)
+        self.native.set_intrinsics(rows, None if env_ids is None else array(env_ids))
+
+
+def view_pose(eye: Any, target: Any) -> list[float]:
+    """Pose x y z qw qx qy qz of a camera in OpenGL's axes. A camera that looks straight up or down has its image's right
+    side along -y, as if it had tilted there from looking along x."""
+    backward = np.asarray(eye) - np.asarray(target)
+    length = np.linalg.norm(backward)
+    if not length > 0:
+        raise ValueError(f"eye and target are both {list(eye)}; they must differ")
+    backward = backward / length
+    right = np.cross([0.0, 0.0, 1.0], backward)
+    right = np.array([0.0, -1.0, 0.0]) if np.linalg.norm(right) < 1e-9 else right / np.linalg.norm(right)
+    matrix = np.eye(4)
+    matrix[:3, :4] = np.stack([right, np.cross(backward, right), backward, eye], axis=1)
+    return to_row(matrix)
+
+
+class RayCasterData(Layer):
     """Hits of a ray caster."""
 
     def __init__(self, sensor: RayCaster) -> None:
@@ -248,8 +282,12 @@ class RayCaster(_Sensor):
     def data(self) -> RayCasterData:
         return RayCasterData(self)
 
+    @property
+    def num_rays(self) -> int:
+        return int(self.native["hits"].shape[1])
 
-class ContactSensorData:
+
+class ContactSensorData(Layer):
     """Contact forces of bodies. Quantities that are not configured are None."""
 
     def __init__(self, sensor: ContactSensor) -> None:
@@ -320,16 +358,7 @@ class ContactSensor(_Sensor):
     def find_bodies(self, name_keys: Any, preserve_order: bool = False) -> tuple[list[int], list[str]]:
         """Indices and names of the bodies that match a pattern or a list of patterns, in the order of the bodies, or with
         ``preserve_order`` in that of the patterns. Each pattern must match."""
-        patterns = [name_keys] if isinstance(name_keys, str) else list(name_keys)
-        found: list[int] = []
-        for pattern in patterns:
-            matched = [at for at, name in enumerate(self.body_names) if re.fullmatch(pattern, name)]
-            if not matched:
-                raise ValueError(f"no body matches {pattern!r}; bodies: {', '.join(self.body_names)}")
-            found += [at for at in matched if at not in found]
-        if not preserve_order:
-            found.sort()
-        return found, [self.body_names[at] for at in found]
+        return resolve(name_keys, self.body_names, preserve_order, "body")
 
     def compute_first_contact(self, dt: float, abs_tol: float = 1.0e-8) -> Any:
         """True for bodies that came into contact within the last ``dt`` seconds, shape (n, bodies)."""
@@ -346,7 +375,7 @@ class ContactSensor(_Sensor):
         return tensor((times > 0) & (times < limit))
 
 
-class FrameTransformerData:
+class FrameTransformerData(Layer):
     """Poses of frames. Rotations are w x y z."""
 
     def __init__(self, sensor: FrameTransformer) -> None:
@@ -407,7 +436,7 @@ class FrameTransformer(_Sensor):
         return len(self.native.columns)
 
 
-class ImuData:
+class ImuData(Layer):
     """Measurements of an IMU: velocities and accelerations in its own axes."""
 
     def __init__(self, sensor: Imu) -> None:

@@ -6,6 +6,7 @@ import warnings
 from typing import Any, ClassVar
 
 from ...errors import ViewerError
+from .._layer import Layer
 from ..configclass import configclass
 from .spawners import (
     CollisionPropertiesCfg,
@@ -98,7 +99,7 @@ class UrdfFileCfg:
     activate_contact_sensors: bool = True
 
 
-class SimulationContext:
+class SimulationContext(Layer):
     """The simulation of the script. It exists before its scene, and steps it once it is built."""
 
     _instance: ClassVar[SimulationContext | None] = None
@@ -117,8 +118,21 @@ class SimulationContext:
         """The current context, or None."""
         return cls._instance
 
+    @classmethod
+    def clear_instance(cls) -> None:
+        """Frees the current context."""
+        if cls._instance is not None:
+            cls._instance.close()
+
     def get_physics_dt(self) -> float:
         return float(self.cfg.dt)
+
+    def get_rendering_dt(self) -> float:
+        return self.get_physics_dt() * self.cfg.render_interval
+
+    def has_gui(self) -> bool:
+        """True if a window is open."""
+        return self.window is not None and bool(self.window.is_open)
 
     def set_camera_view(self, eye: Any, target: Any) -> None:
         """Sets the view of windows."""
@@ -149,6 +163,12 @@ class SimulationContext:
 
     def render(self) -> None:
         """Does nothing: windows draw on their own threads."""
+
+    def forward(self) -> None:
+        """Does nothing: states are current after every write."""
+
+    def play(self) -> None:
+        """Does nothing: a simulation with a scene always plays."""
 
     def is_playing(self) -> bool:
         return self.native is not None

@@ -13,8 +13,9 @@ from kinetoscope import SimulationManager as NativeSimulationManager
 from kinetoscope import cfg as native
 from kinetoscope.errors import ConfigError, ViewerError
 from kinetoscope.compat import step_limit, unsupported
+from kinetoscope.compat._layer import Layer
 from kinetoscope.compat._poses import to_row
-from kinetoscope.compat._tensors import array, device, tensor
+from kinetoscope.compat._tensors import array, tensor
 from .cfg import (
     ArticulationCfg,
     JointDrivePropertiesCfg,
@@ -55,7 +56,7 @@ WITHOUT_MEANING = (
 RENDERERS = {"auto": "raster", "hybrid": "hybrid", "fast-rt": "fast_ray_traced", "rt": "ray_traced"}
 
 
-class SimulationManager:
+class SimulationManager(Layer):
     """A simulation with EmbodiChain's methods. ``native`` is the simulation of this package."""
 
     def __init__(self, sim_config: SimulationManagerCfg | None = None) -> None:
@@ -89,10 +90,6 @@ class SimulationManager:
     @property
     def num_envs(self) -> int:
         return self.native.num_envs
-
-    @property
-    def device(self) -> Any:
-        return device()
 
     @property
     def is_use_gpu_physics(self) -> bool:
@@ -228,8 +225,20 @@ class SimulationManager:
 
     get_articulation = get_rigid_object = get_sensor = get_asset = get_robot
 
+    def _uids(self, *kinds: type) -> list[str]:
+        return [uid for uid, asset in self._assets.items() if type(asset) in kinds]
+
     def get_robot_uid_list(self) -> list[str]:
-        return [uid for uid, asset in self._assets.items() if isinstance(asset, Robot)]
+        return self._uids(Robot)
+
+    def get_articulation_uid_list(self) -> list[str]:
+        return self._uids(Articulation)
+
+    def get_rigid_object_uid_list(self) -> list[str]:
+        return self._uids(RigidObject)
+
+    def get_sensor_uid_list(self) -> list[str]:
+        return self._uids(Camera, StereoCamera, ContactSensor)
 
     def reset_objects_state(self, env_ids: Any = None, excluded_uids: Any = None) -> None:
         """Resets environments to their initial state."""

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from kinetoscope.compat._layer import Layer
 from kinetoscope.compat._poses import rows, to_matrix
 from kinetoscope.compat._tensors import array, tensor
 
@@ -18,7 +19,7 @@ def ids(values: Any) -> Any:
     return None if values is None else array(values)
 
 
-class ArticulationData:
+class ArticulationData(Layer):
     """State of an articulation as tensors with the environments on the first axis."""
 
     def __init__(self, native: Any) -> None:
@@ -69,6 +70,14 @@ class ArticulationData:
         return tensor(self._native.damping)
 
     @property
+    def joint_friction(self) -> Any:
+        return tensor(self._native.friction)
+
+    @property
+    def joint_armature(self) -> Any:
+        return tensor(self._native.armature)
+
+    @property
     def root_pose(self) -> Any:
         return tensor(self._native.root_pose)
 
@@ -77,8 +86,21 @@ class ArticulationData:
         return tensor(self._native.root_velocity)
 
     @property
+    def root_lin_vel(self) -> Any:
+        return tensor(self._native.root_velocity[:, :3])
+
+    @property
+    def root_ang_vel(self) -> Any:
+        return tensor(self._native.root_velocity[:, 3:])
+
+    @property
     def root_state(self) -> Any:
         return tensor(self._native.root_state)
+
+    @property
+    def body_state(self) -> Any:
+        """Poses and velocities of the links, shape (N, links, 13)."""
+        return tensor(np.concatenate([self._native.link_poses, self._native.link_velocities], axis=-1))
 
     @property
     def body_link_pose(self) -> Any:
@@ -89,7 +111,7 @@ class ArticulationData:
         return tensor(self._native.link_velocities)
 
 
-class Articulation:
+class Articulation(Layer):
     """An articulation. ``native`` is the object of this package."""
 
     def __init__(self, manager: Any, native: Any, cfg: Any) -> None:
@@ -123,8 +145,37 @@ class Articulation:
         return len(self.native.link_names)
 
     @property
+    def root_link_name(self) -> str:
+        return self.native.link_names[0]
+
+    @property
+    def active_dof(self) -> int:
+        return self.native.active_dof
+
+    @property
+    def active_joint_ids(self) -> list[int]:
+        return self.native.active_joint_ids()
+
+    @property
     def mimic_ids(self) -> list[int]:
         return self.native.mimic_joint_ids
+
+    def _drivers(self) -> list[tuple[int, float, float]]:
+        """Driving joint, multiplier and offset of each joint in ``mimic_ids``."""
+        drivers = self.native.mimic_drivers
+        return [drivers[joint] for joint in self.native.mimic_joint_ids]
+
+    @property
+    def mimic_parents(self) -> list[int]:
+        return [parent for parent, _, _ in self._drivers()]
+
+    @property
+    def mimic_multipliers(self) -> list[float]:
+        return [multiplier for _, multiplier, _ in self._drivers()]
+
+    @property
+    def mimic_offsets(self) -> list[float]:
+        return [offset for _, _, offset in self._drivers()]
 
     def _rows(self, values: Any, env_ids: Any) -> Any:
         """Rows for the selected environments. As in EmbodiChain, one row does not stand for several environments."""
@@ -163,8 +214,51 @@ class Articulation:
     def get_qf(self) -> Any:
         return tensor(self.native.qf)
 
-    def get_qpos_limits(self) -> Any:
-        return tensor(self.native.qpos_limits)
+    def _selected(self, values: Any, joint_ids: Any, env_ids: Any) -> Any:
+        """Values of all environments and joints, or of the selected ones."""
+        values = values if env_ids is None else values[array(env_ids)]
+        return tensor(values if joint_ids is None else values[:, array(joint_ids)])
+
+    def get_qpos_limits(self, joint_ids: Any = None, env_ids: Any = None) -> Any:
+        """Lower and upper limits, shape (n, joints, 2)."""
+        return self._selected(self.native.qpos_limits, joint_ids, env_ids)
+
+    def get_qvel_limits(self, joint_ids: Any = None, env_ids: Any = None) -> Any:
+        return self._selected(self.native.qvel_limits, joint_ids, env_ids)
+
+    def get_qf_limits(self, joint_ids: Any = None, env_ids: Any = None) -> Any:
+        return self._selected(self.native.qf_limits, joint_ids, env_ids)
+
+    def set_qpos_limits(self, qpos_limits: Any, joint_ids: Any = None, env_ids: Any = None) -> None:
+        self.native.set_qpos_limits(array(qpos_limits), ids(joint_ids), ids(env_ids))
+
+    def set_qvel_limits(self, qvel_limits: Any, joint_ids: Any = None, env_ids: Any = None) -> None:
+        self.native.set_qvel_limits(array(qvel_limits), ids(joint_ids), ids(env_ids))
+
+    def set_qf_limits(self, qf_limits: Any, joint_ids: Any = None, env_ids: Any = None) -> None:
+        self.native.set_qf_limits(array(qf_limits), ids(joint_ids), ids(env_ids))
+
+    def get_joint_drive(self, joint_ids: Any = None, env_ids: Any = None) -> tuple[Any, ...]:
+        """Stiffness, damping, largest effort, largest velocity, friction and armature, each of shape (n, joints)."""
+        robot = self.native
+        values = (robot.stiffness, robot.damping, robot.qf_limits, robot.qvel_limits, robot.friction, robot.armature)
+        return tuple(self._selected(value, joint_ids, env_ids) for value in values)
+
+    def get_user_ids(self, link_name: str | None = None) -> Any:
+        """Values in the mask channel, the same in every environment: shape (n,) of a link, (n, links) of all."""
+        table = {(entity, link): mask_id for mask_id, entity, link, _ in self.manager.native.mask_ids}
+        links = self.native.link_names if link_name is None else [link_name]
+        values = np.array([table.get((self.uid, link), 0) for link in links], dtype=np.int32)
+        rows = np.tile(values, (self.manager.num_envs, 1))
+        return tensor(rows if link_name is None else np.ascontiguousarray(rows[:, 0]))
+
+    def clear_dynamics(self, env_ids: Any = None) -> None:
+        """Sets velocities, their targets and efforts to 0."""
+        count = self.manager.num_envs if env_ids is None else len(array(env_ids))
+        zero = np.zeros((count, self.native.dof))
+        self.native.write_qvel(zero, None, ids(env_ids))
+        self.native.set_qvel_target(zero, None, ids(env_ids))
+        self.native.set_qf_target(zero, None, ids(env_ids))
 
     def get_local_pose(self, to_matrix: bool = False) -> Any:
         return poses(self.native.root_pose, to_matrix)
@@ -266,7 +360,27 @@ class Robot(Articulation):
         return tensor(found.success), tensor(found.qpos)
 
 
-class RigidObjectData:
+    def compute_batch_fk(self, qpos: Any, name: str, env_ids: Any = None, to_matrix: bool = False) -> Any:
+        """Poses of the end of a control part for several positions in each environment, shape (n, batch, joints)."""
+        qpos = np.asarray(array(qpos), dtype=float)
+        columns = [self.native.compute_fk(qpos[:, at], name, env_ids=ids(env_ids)) for at in range(qpos.shape[1])]
+        return poses(np.stack(columns, axis=1), to_matrix)
+
+    def compute_batch_ik(self, pose: Any, joint_seed: Any = None, name: str = "arm", env_ids: Any = None) -> Any:
+        """Joint positions for several poses in each environment, shape (n, batch, 7) or (n, batch, 4, 4): success (n, batch)
+        and positions (n, batch, joints)."""
+        pose = np.asarray(array(pose), dtype=float)
+        seeds = None if joint_seed is None else np.asarray(array(joint_seed), dtype=float)
+        found = [
+            self.native.compute_ik(
+                rows(pose[:, at]), name, initial=None if seeds is None else seeds[:, at], env_ids=ids(env_ids)
+            )
+            for at in range(pose.shape[1])
+        ]
+        return tuple(tensor(np.stack([getattr(one, part) for one in found], axis=1)) for part in ("success", "qpos"))
+
+
+class RigidObjectData(Layer):
     """State of a rigid object."""
 
     def __init__(self, native: Any) -> None:
@@ -289,7 +403,7 @@ class RigidObjectData:
         return tensor(self._native.velocity[:, 3:])
 
 
-class RigidObject:
+class RigidObject(Layer):
     """A rigid object. ``native`` is the object of this package."""
 
     def __init__(self, manager: Any, native: Any, cfg: Any) -> None:
@@ -327,6 +441,43 @@ class RigidObject:
 
     def set_mass(self, mass: Any, env_ids: Any = None) -> None:
         self.native.set_mass(array(mass), ids(env_ids))
+
+    def get_friction(self) -> Any:
+        """Sliding friction, shape (n,)."""
+        return tensor(self.native.friction[:, 0])
+
+    def set_friction(self, friction: Any, env_ids: Any = None) -> None:
+        """Sets the sliding friction, shape (n,)."""
+        values = self.native.friction if env_ids is None else self.native.friction[array(env_ids)]
+        values[:, 0] = array(friction)
+        self.native.set_friction(values, ids(env_ids))
+
+    def get_inertia(self) -> Any:
+        """Principal moments of inertia, shape (n, 3)."""
+        return tensor(self.native.inertia)
+
+    def set_inertia(self, inertia: Any, env_ids: Any = None) -> None:
+        self.native.set_inertia(array(inertia), ids(env_ids))
+
+    @property
+    def body_state(self) -> Any:
+        """Pose and velocity, shape (n, 13)."""
+        return tensor(np.concatenate([self.native.pose, self.native.velocity], axis=1))
+
+    @property
+    def is_static(self) -> bool:
+        return self.cfg.body_type == "static"
+
+    @property
+    def is_non_dynamic(self) -> bool:
+        return self.cfg.body_type != "dynamic"
+
+    def clear_dynamics(self, env_ids: Any = None) -> None:
+        """Sets velocities, external forces and torques to 0."""
+        count = self.manager.num_envs if env_ids is None else len(array(env_ids))
+        if not self.is_non_dynamic:
+            self.native.write_velocity(np.zeros((count, 6)), ids(env_ids))
+            self.add_force_torque(env_ids=env_ids)
 
     def get_user_ids(self) -> Any:
         """Value in the mask channel, the same in every environment."""

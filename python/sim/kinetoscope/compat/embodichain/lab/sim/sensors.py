@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from kinetoscope.compat import unsupported
+from kinetoscope.compat._layer import Layer
 from kinetoscope.compat._poses import rows, to_matrix
 from kinetoscope.compat._tensors import array, tensor
 from kinetoscope.compat.configclass import configclass
@@ -112,7 +113,7 @@ def vector(values: Any) -> list[float]:
     return [float(x) for x in array(values)]
 
 
-class Camera:
+class Camera(Layer):
     """A camera. ``native`` is the sensor of this package."""
 
     def __init__(self, manager: Any, native: Any, cfg: CameraCfg) -> None:
@@ -159,6 +160,10 @@ class Camera:
     def get_arena_pose(self, to_matrix_form: bool = False) -> Any:
         values = self.native.pose_w("opengl")
         return tensor(to_matrix(values) if to_matrix_form else values)
+
+    def reset(self, env_ids: Any = None) -> None:
+        """Restores the poses and intrinsics of the configuration."""
+        self.native.restore(None if env_ids is None else array(env_ids))
 
     def look_at(self, eye: Any, target: Any, up: Any = None, env_ids: Any = None) -> None:
         up = None if up is None else array(up)
@@ -211,7 +216,7 @@ class StereoCamera(Camera):
         return tensor(middle @ np.linalg.inv(half)), tensor(middle @ half)
 
 
-class ContactSensor:
+class ContactSensor(Layer):
     """Contacts of the listed bodies, at the front of arrays of ``max_contacts_per_env`` rows; others are left out."""
 
     def __init__(self, manager: Any, uid: str, cfg: ContactSensorCfg) -> None:
