@@ -72,7 +72,6 @@ if not TYPE_CHECKING:
         raise AttributeError(f"module 'kinetoscope' has no attribute {name!r}")
 
 
-
 def __dir__() -> list[str]:
     return sorted({*globals(), *_LATER})
 
