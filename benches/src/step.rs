@@ -128,7 +128,7 @@ impl RowsShare {
 
 impl Contender for RowsLoop<'_> {
     fn restart(&mut self) -> BenchResult<()> {
-        for RowsShare { data, first, rows } in &mut self.shares {
+        for RowsShare { data, first, rows, .. } in &mut self.shares {
             for (k, (state, inputs)) in rows.iter_mut().enumerate() {
                 data.reset();
                 self.case.write(*first + k, data);

@@ -253,7 +253,7 @@ impl FoxgloveServer {
     /// Address for Foxglove's dialog "Open connection", such as ``"ws://127.0.0.1:8765"``.
     #[getter]
     fn url(&self) -> String {
-        self.inner.url()
+        self.inner.url().to_string()
     }
 
     /// Number of connected clients.

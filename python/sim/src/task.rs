@@ -118,6 +118,9 @@ impl Task {
                 AutoresetMode::NextStep => "next_step",
                 AutoresetMode::SameStep => "same_step",
                 AutoresetMode::Disabled => "disabled",
+                other => {
+                    return Err(Failure::new(Class::Internal, format!("the autoreset mode {other:?} has no name")));
+                }
             })
         })
     }
