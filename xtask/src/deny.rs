@@ -91,12 +91,12 @@ mod tests {
             let response = format!("HTTP/1.1 {status}\r\nContent-Length: 0\r\nConnection: close\r\n\r\n");
             assert!(is_reachable(&server(response.leak())).expect("an answer"), "{status}");
         }
-        let nobody_listens = {
+        let closed_port = {
             let listener = TcpListener::bind("127.0.0.1:0").expect("a free port");
             format!("http://{}/", listener.local_addr().expect("the server listens"))
         };
         // The domain `invalid` never has an address (RFC 2606).
-        for url in [nobody_listens.as_str(), "https://advisories.invalid/"] {
+        for url in [closed_port.as_str(), "https://advisories.invalid/"] {
             assert!(!is_reachable(url).expect("a failure of the network"), "{url}");
         }
         // A server that does not speak TLS, no URL, and a scheme without a server.
