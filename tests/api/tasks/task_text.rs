@@ -131,7 +131,7 @@ fn mistakes() {
         ("bound = 10", "bond = 10", &["actions.push", "bond", "bound"]),
         ("bound = 10", "", &["actions.push", "missing field", "bound"]),
         ("bound = 10", "bound = \"high\"", &["actions.push", "high"]),
-        ("\"joint_pos_rel\"", "\"joint_pos\"", &["observations.policy.positions", "joint_pos_rel"]),
+        ("\"joint_pos_rel\"", "\"joint_pos_relative\"", &["observations.policy.positions", "joint_pos_rel"]),
         ("\"joint_pos_rel\"", "\"camera_rbg\"", &["observations.policy.positions", "camera_rgb"]),
         ("std = 0.01", "sdt = 0.01", &["observations.policy.positions.noise"]),
         ("std = 0.01", "std = -1", &["noise of the observation term \"positions\""]),
