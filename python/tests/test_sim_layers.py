@@ -14,11 +14,11 @@ def test_missing_names_have_advice():
     robot = scene["robot"]
     for owner, name, expected in (
         (robot, "find_joint", ("Articulation.find_joint", "find_joints")),
-        (robot, "compute_jacobian", ("Robot of this package: jacobian",)),
-        (robot, "compute_ik", ("Robot of this package: compute_ik",)),
+        (robot, "compute_jacobian", ("Robot of this package, has ", "jacobian")),
+        (robot, "compute_ik", ("Robot of this package, has compute_ik",)),
         (robot.data, "joint_positions", ("ArticulationData.joint_positions", "joint_pos")),
-        (scene, "record", ("SimulationManager of this package: record",)),
-        (scene, "zzz", ("nearest names: articulations",)),
+        (scene, "record", ("SimulationManager of this package, has record",)),
+        (scene, "zzz", ("known names: articulations",)),
     ):
         with pytest.raises(AttributeError) as caught:
             getattr(owner, name)

@@ -28,13 +28,16 @@ class Layer:
         kind = type(self).__name__
         if name.startswith("_"):
             raise AttributeError(f"{kind!r} object has no attribute {name!r}")
-        own = _public({*dir(type(self)), *vars(self)})
+        own, message = _public({*dir(type(self)), *vars(self)}), f"{kind}.{name} is not in this layer"
         near = difflib.get_close_matches(name, own, n=3, cutoff=0.5)
-        message = f"{kind}.{name} is not in this layer; nearest names: {', '.join(near) or ', '.join(sorted(own))}"
-        native = vars(self).get("native", vars(self).get("_native"))
+        if near:
+            message += f"; nearest names: {', '.join(near)}"
+        native, near_native = vars(self).get("native", vars(self).get("_native")), []
         if native is not None:
             known = _public(dir(native))
-            near = [name] if name in known else difflib.get_close_matches(name, known, n=3, cutoff=0.5)
-            advice = f": {', '.join(near)}" if near else ""
-            message += f"; `native` is the {type(native).__name__} of this package{advice}"
+            near_native = [name] if name in known else difflib.get_close_matches(name, known, n=3, cutoff=0.5)
+        if near_native:
+            message += f"; `native`, the {type(native).__name__} of this package, has {', '.join(near_native)}"
+        if not near and not near_native:
+            message += f"; known names: {', '.join(sorted(own))}"
         raise AttributeError(message)
