@@ -81,7 +81,8 @@ def test_images(parts, fog):
     assert np.median(error) < (2e-6 if version() >= (3, 0) else 1e-2)
     values = psnr(expected.plain, found.plain), psnr(expected.rgb, found.rgb), psnr(expected.plain, control.plain)
     print([round(value, 1) for value in values])
-    assert values[0] > 34 and values[1] > 32 and values[2] < 28, values
+    # With shadows, 30 dB as in test_rules.py: shadow maps have other texels than OpenGL's.
+    assert values[0] > 40 and values[1] > 30 and values[2] < 28, values
 
 
 def test_invalid_transforms():
