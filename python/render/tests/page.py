@@ -15,10 +15,7 @@ _BEGIN, _END = "<!-- begin of agreement.json -->", "<!-- end of agreement.json -
 # PSNR below which a view needs a cause [dB].
 LEAST = 30.0
 # Causes of views below that, by model and view.
-CAUSES: dict[tuple[str, str], str] = {
-    ("robosuite/arenas/bins_arena", "camera 0"): "boxes with a texture are meshes here, whose depth is rounded otherwise "
-    "than that of the boxes for collisions at the same place, which shine through; OpenGL shows the later one",
-}
+CAUSES: dict[tuple[str, str], str] = {}
 
 
 def rounded(result: dict[str, Any]) -> dict[str, Any]:

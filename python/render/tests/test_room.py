@@ -11,12 +11,13 @@ import kinetoscope_render as kr
 
 SIZE = (96, 128)
 QUATERNION = (0.9, 0.1, 0.05, 0.3)
-# Attenuation and fog depend on lengths, the sun on a direction, the other light on a position.
+# Attenuation and fog depend on lengths, the sun on a direction, the other light on a position. The headlight of OpenGL stays
+# where the camera was at the update.
 WORLD = """<mujoco><statistic extent="2" center="0 0 .5"/><visual><map fogstart=".5" fogend="3"/>
-  <headlight ambient=".1 .1 .1" diffuse=".3 .3 .3" specular="0 0 0"/></visual><asset>
+  <headlight active="0"/></visual><asset>
   <texture type="skybox" builtin="gradient" rgb1=".9 .5 .3" rgb2="0 0 .3" width="64" height="384"/></asset><worldbody>
   <light pos="1 -1 3" dir="-.3 .3 -1" diffuse=".8 .8 .8" specular=".3 .3 .3" attenuation=".3 .2 .1"/>
-  <light pos="-1 -1 3" dir=".3 .3 -1" diffuse=".2 .2 .4" {sun}/>
+  <light pos="-1 -1 3" dir=".3 .3 -1" diffuse=".2 .2 .4" ambient=".1 .1 .1" {sun}/>
   <camera name="c" pos="0 -3 1.6" xyaxes="1 0 0 0 .47 .88"/><geom type="plane" size="3 3 .1" rgba=".6 .6 .6 1"/>
   <geom type="box" pos=".5 0 .31" size=".3 .3 .3" euler="0 0 20" rgba=".8 .2 .1 1"/>
   <geom pos="-.5 0 .4" size=".3" rgba=".2 .5 .8 1"/></worldbody></mujoco>"""
@@ -35,15 +36,19 @@ def transform(scene, translate, rotate, scale):
 
 
 class Transformed:
-    """A renderer whose scenes are transformed, with or without fog."""
+    """A renderer whose scenes are transformed after their update, with or without fog.
+
+    An update of a transformed scene moves the cameras of the model to the room: images then hardly change.
+    """
 
     def __init__(self, renderer, parts, fog):
         self._renderer, self._parts, self._fog = renderer, parts, fog
 
     def update_scene(self, data, camera):
         scene = self._renderer.scene
-        transform(scene, *self._parts)
+        scene.enabletransform = 0
         self._renderer.update_scene(data, camera)
+        transform(scene, *self._parts)
         scene.flags[int(mujoco.mjtRndFlag.mjRND_FOG)] = self._fog
 
     def __getattr__(self, name):
@@ -76,7 +81,8 @@ def test_images(parts, fog):
     assert np.median(error) < (2e-6 if version() >= (3, 0) else 1e-2)
     values = psnr(expected.plain, found.plain), psnr(expected.rgb, found.rgb), psnr(expected.plain, control.plain)
     print([round(value, 1) for value in values])
-    assert values[0] > 34 and values[1] > 32 and values[2] < 28, values
+    # With shadows, 30 dB as in test_rules.py: shadow maps have other texels than OpenGL's.
+    assert values[0] > 40 and values[1] > 30 and values[2] < 28, values
 
 
 def test_invalid_transforms():

@@ -100,6 +100,26 @@ mod tests {
         assert!(closest > 0.35, "{closest}");
     }
 
+    /// Cameras see scenes in MuJoCo's look at a finer level than other scenes. Lights do not.
+    #[test]
+    fn limits_of_scenes() {
+        let view = View::look_at([64, 64], 0.9, [0.; 3], [0., 0., 1.], [0., 1., 0.]).expect("a good view");
+        let camera = Projection::from(&view);
+        let light = Projection { is_camera: false, ..camera };
+        let plain = RenderScene::empty();
+        let rules = kinetoscope_scene::OpenGlRules {
+            shadow_clip: 1.0,
+            shadow_scale: 1.0,
+            culls_backs: false,
+            is_additive: false,
+            tessellation: None,
+        };
+        let mut opengl = RenderScene::empty();
+        opengl.opengl = Some(rules);
+        let limits = [(&plain, &camera), (&plain, &light), (&opengl, &camera), (&opengl, &light)];
+        assert_eq!(limits.map(|(scene, projection)| largest_shift(scene, projection)), [0.5, 0.5, 0.1, 0.5]);
+    }
+
     #[test]
     fn partly_behind() {
         let view = View::look_at([64, 64], 0.9, [0.; 3], [0., 0., 1.], [0., 1., 0.]).expect("a good view");

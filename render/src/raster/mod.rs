@@ -161,6 +161,49 @@ fn depth_test<S: Simd>(s: S, tile: &mut Tile, at: usize, hit: M<S>, nearness: F<
     nearer.any_true()
 }
 
+/// Bounds of a round shape in a parallel projection: a line, and the distance from it \[pixels\]. Most blocks around a long
+/// slanted capsule miss it.
+#[derive(Clone, Copy, Debug)]
+struct Outline {
+    ends: [[f32; 2]; 2],
+    reach: f32,
+}
+
+impl Outline {
+    /// Distance of the corners of a block from its middle, and of the samples of a pixel from it \[pixels\], rounded up.
+    const BLOCK_REACH: f32 = 7.0;
+
+    /// The bounds of a shape; `None` for other shapes, and in perspective.
+    #[inline(always)]
+    fn of(shape: &Shape, placed: &PlacedInstance, projection: &Projection) -> Option<Self> {
+        let (radius, half) = match shape {
+            Shape::Sphere(sphere) => (sphere.radius, 0.0),
+            Shape::Capsule(capsule) => (capsule.radius, capsule.half_length),
+            Shape::Cylinder(cylinder) => (cylinder.radius, cylinder.half_length),
+            _ => return None,
+        };
+        let end = |z: f32| {
+            let [x, y, _] = placed.camera_from_instance.apply([0.0, 0.0, z]);
+            [x * projection.fx + projection.cx, y * projection.fy + projection.cy]
+        };
+        let reach = 1.0001 * radius * projection.fx.max(projection.fy) + Self::BLOCK_REACH;
+        projection.parallel.then(|| Self { ends: [end(-half), end(half)], reach })
+    }
+
+    /// True if no sample of a block is within the bounds.
+    #[inline(always)]
+    fn misses(&self, block: [usize; 2]) -> bool {
+        let middle = block.map(|k| (k * BLOCK + BLOCK / 2) as f32);
+        let [from, to] = self.ends;
+        let (along, at) = ([to[0] - from[0], to[1] - from[1]], [middle[0] - from[0], middle[1] - from[1]]);
+        let square = along[0] * along[0] + along[1] * along[1];
+        let share = (along[0] * at[0] + along[1] * at[1]) / square.max(1e-12);
+        let share = share.clamp(0.0, 1.0);
+        let off = [at[0] - share * along[0], at[1] - share * along[1]];
+        off[0] * off[0] + off[1] * off[1] > self.reach * self.reach
+    }
+}
+
 /// Casts the rays of all samples in an area of blocks.
 #[inline(always)]
 #[expect(clippy::too_many_arguments, reason = "inlined into its only caller")]
@@ -174,13 +217,13 @@ fn draw_primitive<S: Simd>(
     first_id: u32,
     area: [usize; 4],
 ) {
+    let outline = Outline::of(shape, placed, projection);
     for by in area[1]..=area[3] {
         for bx in area[0]..=area[2] {
             let block = tile.block(bx, by);
-            if tile.is_occluded(block, item.nearness) {
+            if tile.is_occluded(block, item.nearness) || outline.is_some_and(|outline| outline.misses([bx, by])) {
                 continue;
             }
-            tile.prepare_block(block);
             let mut drawn = false;
             let offsets = tile.offsets;
             for (plane, offset) in offsets.iter().enumerate().take(tile.planes) {
@@ -197,6 +240,7 @@ fn draw_primitive<S: Simd>(
                     if !is_hit.any_true() {
                         continue;
                     }
+                    tile.prepare_block(block);
                     let q = match shape {
                         // Same as an infinite plane at the same height, so that the later plane does not shine through.
                         Shape::Plane(_) if !projection.parallel => {

@@ -60,8 +60,12 @@ impl Tile {
         self.planes = planes;
         self.empty = farthest;
         let count = blocks[0] * blocks[1];
-        self.nearness.resize(count * planes * BLOCK_AREA, farthest);
-        self.id.resize(count * planes * BLOCK_AREA, NO_ID);
+        // Memory of larger tiles is kept: filling it again would take longer than drawing small images.
+        let samples = count * planes * BLOCK_AREA;
+        if self.nearness.len() < samples {
+            self.nearness.resize(samples, farthest);
+            self.id.resize(samples, NO_ID);
+        }
         for (flags, value) in [(&mut self.dirty, false), (&mut self.cleared, true)] {
             flags.clear();
             flags.resize(count, value);
@@ -100,6 +104,12 @@ impl Tile {
         }
     }
 
+    /// Nearness of all samples of a block that nothing was drawn into, whatever its memory holds; `None` for other blocks.
+    #[inline(always)]
+    pub(crate) fn cleared_nearness(&self, block: usize) -> Option<f32> {
+        self.cleared[block].then_some(self.empty)
+    }
+
     /// Copies the nearness of another tile, and sets all ids to [`NO_ID`].
     pub(crate) fn copy_depths(&mut self, other: &Self) {
         self.copy(other);
@@ -111,8 +121,11 @@ impl Tile {
         let Self { x0, y0, blocks_x, blocks_y, planes, .. } = *other;
         (self.x0, self.y0, self.blocks_x, self.blocks_y, self.planes) = (x0, y0, blocks_x, blocks_y, planes);
         self.offsets = other.offsets;
-        self.nearness.clone_from(&other.nearness);
-        self.id.clone_from(&other.id);
+        let samples = 0..other.samples(blocks_x * blocks_y, 0);
+        self.nearness.clear();
+        self.nearness.extend_from_slice(&other.nearness[samples.clone()]);
+        self.id.clear();
+        self.id.extend_from_slice(&other.id[samples]);
         self.farthest.clone_from(&other.farthest);
         self.dirty.clone_from(&other.dirty);
         self.cleared.clone_from(&other.cleared);

@@ -550,6 +550,12 @@ fn light_at_corners<S: Simd>(
                 Some(eye) => V3::splat(s, eye),
                 None => at.position.sub(rays.direction.scale(rays.distance)),
             };
+            let away = {
+                #[inline(always)]
+                |corner: usize| corners.positions[corner].sub(eye).unit(s)
+            };
+            // Needed by highlights only, which most materials have.
+            let away = if shiny.strength == 0.0 { corners.positions } else { [away(0), away(1), away(2)] };
             let ambient = [0, 1, 2].map(|k| base[k] * (scene.ambient.ground[k] + material.emission));
             let mut sums = [V3::splat(s, ambient); 3];
             let mut passes = V3::splat(s, [0.0; 3]);
@@ -571,7 +577,7 @@ fn light_at_corners<S: Simd>(
                     };
                     if shiny.is_visible(light.specular) {
                         // The cosine between the normal and the half vector, compared before its root is taken.
-                        let half = to.sub(position.sub(eye).unit(s));
+                        let half = to.sub(away[corner]);
                         let (along, square) = (normal.dot(half), half.dot(half));
                         let is_bright = (along * along).simd_gt(square * (shiny.faint * shiny.faint));
                         let seen = lanes & is_bright & along.simd_gt(zero) & facing.simd_gt(zero);

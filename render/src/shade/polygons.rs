@@ -4,7 +4,8 @@
 
 use super::light::cos_deg;
 use super::surface::{InstanceSurface, Surface};
-use crate::simd::{F, LANES, M, Simd, V3, load};
+use super::texture::floor_lanes;
+use crate::simd::{F, LANES, M, Simd, V3, abs, load, max, min, select, splat};
 use kinetoscope_scene::shape::{RenderMesh, Shape};
 use kinetoscope_scene::{PlaneLines, Tessellation};
 
@@ -17,14 +18,6 @@ pub(crate) struct CornerLanes<S: Simd> {
     pub(crate) normals: [V3<S>; 3],
     /// Barycentric coordinates of the points.
     pub(crate) shares: [F<S>; 3],
-}
-
-/// A triangle around a point, in the frame of the instance.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-struct Corners {
-    positions: [[f32; 3]; 3],
-    normals: [[f32; 3]; 3],
-    shares: [f32; 3],
 }
 
 /// Corners of the polygons of all shapes of a frame.
@@ -81,225 +74,375 @@ impl PolygonTables {
         at: &Surface<S>,
         lanes: M<S>,
     ) -> CornerLanes<S> {
-        let (point, normal) = (at.local_position, at.normal);
-        let point = [point.x.array(), point.y.array(), point.z.array()];
-        let normal = [normal.x.array(), normal.y.array(), normal.z.array()];
-        let lanes = lanes.to_bitmask();
-        let found = match mesh {
-            Some(mesh) => corners_of_lanes(lanes, |k| of_mesh(mesh, triangle[k] as usize, point.map(|axis| axis[k]))),
-            None => self.of_shape_lanes(lanes, source, &point, &normal),
-        };
-        let world = source.world_from_instance;
-        let v3 = |a: &[[f32; LANES]; 3]| V3 { x: load(s, &a[0]), y: load(s, &a[1]), z: load(s, &a[2]) };
-        let [a, b, c] = &found.positions;
-        let place = {
-            #[inline(always)]
-            |a: &[[f32; LANES]; 3]| v3(a).rotate(&world.rotation).add(V3::splat(s, world.translation))
-        };
-        let positions = [place(a), place(b), place(c)];
-        let [a, b, c] = &found.normals;
-        let normals = [v3(a).rotate(&world.rotation), v3(b).rotate(&world.rotation), v3(c).rotate(&world.rotation)];
-        let [a, b, c] = &found.shares;
-        CornerLanes { positions, normals, shares: [load(s, a), load(s, b), load(s, c)] }
+        match mesh {
+            Some(mesh) => of_mesh(s, source, mesh, triangle, at.local_position, lanes.to_bitmask()),
+            None => self.of_instance(s, source, at),
+        }
     }
 
-    /// Triangles at points of a shape with a closed form. One copy for all instruction sets.
+    /// Corners at points of an instance that is a shape with a closed form. One copy per instruction set.
     #[inline(never)]
-    fn of_shape_lanes(
-        &self,
-        lanes: u64,
-        source: &InstanceSurface<'_>,
-        point: &[[f32; LANES]; 3],
-        normal: &[[f32; LANES]; 3],
-    ) -> CornerArrays {
-        let rotation = source.world_from_instance.rotation;
-        corners_of_lanes(lanes, |k| {
-            let normal = [0, 1, 2].map(|j| (0..3).map(|i| rotation[i][j] * normal[i][k]).sum::<f32>());
-            self.of_shape(&source.instance.shape, source.plane_lines, [0, 1, 2].map(|axis| point[axis][k]), normal)
-        })
+    fn of_instance<S: Simd>(&self, s: S, source: &InstanceSurface<'_>, at: &Surface<S>) -> CornerLanes<S> {
+        s.vectorize(
+            #[inline(always)]
+            || {
+                let rotation = &source.world_from_instance.rotation;
+                let into_local = [0, 1, 2].map(|j| [0, 1, 2].map(|i| rotation[i][j]));
+                let normal = at.normal.rotate(&into_local);
+                let corners = self.of_shape(s, &source.instance.shape, source.plane_lines, at.local_position, normal);
+                corners.into_world(s, source)
+            },
+        )
     }
 
-    /// Triangle at a point of a shape with a closed form, where it has this outward normal (or its opposite).
-    fn of_shape(&self, shape: &Shape, lines: [PlaneLines; 2], p: [f32; 3], normal: [f32; 3]) -> Corners {
+    /// Triangles at points of a shape with a closed form, where it has these outward normals (or their opposites), in the
+    /// frame of the shape.
+    #[inline(always)]
+    fn of_shape<S: Simd>(
+        &self,
+        s: S,
+        shape: &Shape,
+        lines: [PlaneLines; 2],
+        p: V3<S>,
+        normal: V3<S>,
+    ) -> CornerLanes<S> {
         let quality = self.tessellation.unwrap_or_default();
+        let (zero, one) = (splat(s, 0.0), splat(s, 1.0));
+        let minus = splat(s, -1.0);
         match shape {
             Shape::Plane(_) => {
-                let [(x, s), (y, t)] = [0, 1].map(|k| lines[k].cell(p[k]));
-                quad([s, t], true, |u, v| ([x[usize::from(u)], y[usize::from(v)], 0.0], [0.0, 0.0, 1.0]))
+                let (x, u) = LineLanes::of(s, lines[0]).cell(s, p.x);
+                let (y, v) = LineLanes::of(s, lines[1]).cell(s, p.y);
+                let up = V3 { x: zero, y: zero, z: one };
+                Quad::new(s, [u, v], one.simd_eq(one)).corners(
+                    #[inline(always)]
+                    |right, upper| (V3 { x: pick(right, x), y: pick(upper, y), z: zero }, up),
+                )
             }
             Shape::Box(cuboid) => {
-                let axis = (0..3).fold(0, |a, b| if normal[b].abs() > normal[a].abs() { b } else { a });
+                let (nx, ny, nz) = (abs(normal.x), abs(normal.y), abs(normal.z));
+                let by_x = nx.simd_ge(ny) & nx.simd_ge(nz);
+                let by_z = !by_x & nz.simd_gt(ny);
+                let by_y = !by_x & !by_z;
                 // The visible side tells the face, also from inside.
-                let side = if p[axis] < 0.0 { -1.0 } else { 1.0 };
-                let [right, up] = [[1, 2], [0, 2], [0, 1]][axis];
+                let on_axis = select(by_x, p.x, select(by_y, p.y, p.z));
+                let side = select(on_axis.simd_lt(zero), minus, one);
+                let half = cuboid.half.map(|half| splat(s, half));
                 let count = f32::from(quality.quads.clamp(1, MAX_POLYGONS));
-                let [(x, s), (y, t)] = [right, up].map(|k| {
-                    let half = cuboid.half[k];
-                    PlaneLines { reach: half, step: 2.0 * half / count, border: half }.cell(p[k])
-                });
-                let is_anti = (side > 0.0) != (axis == 1);
-                quad([s, t], is_anti, |u, v| {
-                    let (mut position, mut normal) = ([side * cuboid.half[axis]; 3], [0.0; 3]);
-                    (position[right], position[up]) = (x[usize::from(u)], y[usize::from(v)]);
-                    normal[axis] = side;
-                    (position, normal)
-                })
+                let lines = {
+                    #[inline(always)]
+                    |half: F<S>| LineLanes { reach: half, step: half * 2.0 / count, border: half }
+                };
+                let (x, u) = lines(select(by_x, half[1], half[0])).cell(s, select(by_x, p.y, p.x));
+                let (y, v) = lines(select(by_z, half[1], half[2])).cell(s, select(by_z, p.y, p.z));
+                let is_outer = side.simd_gt(zero);
+                let is_anti = (is_outer & !by_y) | (!is_outer & by_y);
+                let [half_x, half_y, half_z] = half;
+                let normal =
+                    V3 { x: select(by_x, side, zero), y: select(by_y, side, zero), z: select(by_z, side, zero) };
+                Quad::new(s, [u, v], is_anti).corners(
+                    #[inline(always)]
+                    |right, upper| {
+                        let (right, upper) = (pick(right, x), pick(upper, y));
+                        let position = V3 {
+                            x: select(by_x, side * half_x, right),
+                            y: select(by_y, side * half_y, select(by_x, right, upper)),
+                            z: select(by_z, side * half_z, upper),
+                        };
+                        (position, normal)
+                    },
+                )
             }
-            Shape::Sphere(sphere) => self.of_ball([sphere.radius; 3], p, 0.0),
-            Shape::Ellipsoid(ellipsoid) => self.of_ball(ellipsoid.radii, p, 0.0),
+            Shape::Sphere(sphere) => self.of_ball(s, [sphere.radius; 3], p, zero),
+            Shape::Ellipsoid(ellipsoid) => self.of_ball(s, ellipsoid.radii, p, zero),
             Shape::Capsule(capsule) => {
                 let (radius, half) = (capsule.radius, capsule.half_length);
-                if p[2].abs() > half {
-                    self.of_ball([radius; 3], p, half.copysign(p[2]))
-                } else {
-                    self.of_tube(radius, half, quality.stacks, p)
+                let is_end = abs(p.z).simd_gt(splat(s, half));
+                let center = select(p.z.simd_lt(zero), splat(s, -half), splat(s, half));
+                if is_end.all_true() {
+                    return self.of_ball(s, [radius; 3], p, center);
                 }
+                let tube = self.of_tube(s, radius, half, quality.stacks, p);
+                if !is_end.any_true() {
+                    return tube;
+                }
+                CornerLanes::select(is_end, self.of_ball(s, [radius; 3], p, center), tube)
             }
             Shape::Cylinder(cylinder) => {
                 let (radius, half) = (cylinder.radius, cylinder.half_length);
-                if normal[2].abs() < 0.5 {
-                    return self.of_tube(radius, half, quality.stacks, p);
+                let is_side = abs(normal.z).simd_lt(splat(s, 0.5));
+                let tube = self.of_tube(s, radius, half, quality.stacks, p);
+                if is_side.all_true() {
+                    return tube;
                 }
-                let side = if p[2] < 0.0 { -1.0 } else { 1.0 };
+                let side = select(p.z.simd_lt(zero), minus, one);
                 let count = f32::from((quality.stacks / 2).clamp(1, MAX_POLYGONS));
                 let rings = PlaneLines { reach: radius, step: radius / count, border: radius };
-                let (ring, t) = rings.cell((p[0] * p[0] + p[1] * p[1]).sqrt());
-                let (angles, s) = self.slice(p);
-                quad([s, t], side < 0.0, |u, v| {
-                    let ([c, z], r) = (angles[usize::from(u)], ring[usize::from(v)].max(0.0));
-                    ([r * c, r * z, side * half], [0.0, 0.0, side])
-                })
+                let (ring, t) = LineLanes::of(s, rings).cell(s, (p.x * p.x + p.y * p.y).sqrt());
+                let (cosines, sines, u) = self.slice(s, p.x, p.y);
+                let normal = V3 { x: zero, y: zero, z: side };
+                let cap = Quad::new(s, [u, t], side.simd_lt(zero)).corners(
+                    #[inline(always)]
+                    |right, upper| {
+                        let r = max(pick(upper, ring), zero);
+                        (V3 { x: r * pick(right, cosines), y: r * pick(right, sines), z: side * half }, normal)
+                    },
+                );
+                CornerLanes::select(is_side, tube, cap)
             }
-            _ => Corners { positions: [p; 3], normals: [normal; 3], shares: [1.0, 0.0, 0.0] },
+            _ => CornerLanes { positions: [p; 3], normals: [normal; 3], shares: [one, zero, zero] },
         }
     }
 
-    /// Slice of a round shape at a point: its two ends, and the fraction between them.
-    fn slice(&self, p: [f32; 3]) -> ([[f32; 2]; 2], f32) {
-        let count = self.angles.len().saturating_sub(1).max(1);
-        let turns = angle(p[1], p[0]) * (1.0 / 360.0);
-        let at = (if turns < 0.0 { turns + 1.0 } else { turns }) * count as f32;
-        let index = (at as usize).min(count - 1);
-        let end = |k: usize| self.angles.get(k).copied().unwrap_or([1.0, 0.0]);
-        ([end(index), end(index + 1)], (at - index as f32).clamp(0.0, 1.0))
+    /// Slices of a round shape at points: cosines and sines of their two ends, and the fractions between them.
+    #[inline(always)]
+    fn slice<S: Simd>(&self, s: S, x: F<S>, y: F<S>) -> ([F<S>; 2], [F<S>; 2], F<S>) {
+        let turns = angle(s, y, x) * (1.0 / 360.0);
+        let turns = select(turns.simd_lt(splat(s, 0.0)), turns + 1.0, turns);
+        ends_of(s, &self.angles, turns)
     }
 
-    /// Triangle of a ball with the center (0, 0, `center`).
-    fn of_ball(&self, radii: [f32; 3], p: [f32; 3], center: f32) -> Corners {
-        let q = [p[0] / radii[0], p[1] / radii[1], (p[2] - center) / radii[2]];
-        let (angles, s) = self.slice(q);
-        let count = self.latitudes.len().saturating_sub(1).max(1);
-        let at = (angle(q[2], (q[0] * q[0] + q[1] * q[1]).sqrt()) * (1.0 / 180.0) + 0.5) * count as f32;
-        let index = (at.max(0.0) as usize).min(count - 1);
-        let end = |k: usize| self.latitudes.get(k).copied().unwrap_or([1.0, 0.0]);
-        let latitudes = [end(index), end(index + 1)];
-        quad([s, (at - index as f32).clamp(0.0, 1.0)], true, |u, v| {
-            let ([c, z], [flat, up]) = (angles[usize::from(u)], latitudes[usize::from(v)]);
-            let unit = [flat * c, flat * z, up];
-            let normal = [0, 1, 2].map(|k| unit[k] / radii[k]);
-            ([unit[0] * radii[0], unit[1] * radii[1], unit[2] * radii[2] + center], unit_vector(normal))
-        })
+    /// Triangles of a ball with the centers (0, 0, `center`).
+    #[inline(always)]
+    fn of_ball<S: Simd>(&self, s: S, radii: [f32; 3], p: V3<S>, center: F<S>) -> CornerLanes<S> {
+        let q = V3 { x: p.x / radii[0], y: p.y / radii[1], z: (p.z - center) / radii[2] };
+        let (cosines, sines, u) = self.slice(s, q.x, q.y);
+        let latitude = angle(s, q.z, (q.x * q.x + q.y * q.y).sqrt()) * (1.0 / 180.0) + 0.5;
+        let (flats, ups, v) = ends_of(s, &self.latitudes, latitude);
+        Quad::new(s, [u, v], center.simd_eq(center)).corners(
+            #[inline(always)]
+            |right, upper| {
+                let (flat, up) = (pick(upper, flats), pick(upper, ups));
+                let unit = V3 { x: flat * pick(right, cosines), y: flat * pick(right, sines), z: up };
+                let normal = V3 { x: unit.x / radii[0], y: unit.y / radii[1], z: unit.z / radii[2] };
+                let position = V3 { x: unit.x * radii[0], y: unit.y * radii[1], z: unit.z * radii[2] + center };
+                (position, normal.unit(s))
+            },
+        )
     }
 
-    /// Triangle of the side of a cylinder.
-    fn of_tube(&self, radius: f32, half: f32, stacks: u16, p: [f32; 3]) -> Corners {
-        let (angles, s) = self.slice(p);
+    /// Triangles of the side of a cylinder.
+    #[inline(always)]
+    fn of_tube<S: Simd>(&self, s: S, radius: f32, half: f32, stacks: u16, p: V3<S>) -> CornerLanes<S> {
+        let zero = splat(s, 0.0);
+        let (cosines, sines, u) = self.slice(s, p.x, p.y);
         let count = f32::from(stacks.clamp(1, MAX_POLYGONS));
-        let (heights, t) = PlaneLines { reach: half, step: 2.0 * half / count, border: half }.cell(p[2]);
-        quad([s, t], true, |u, v| {
-            let [c, z] = angles[usize::from(u)];
-            ([radius * c, radius * z, heights[usize::from(v)]], [c, z, 0.0])
-        })
+        let lines = PlaneLines { reach: half, step: 2.0 * half / count, border: half };
+        let (heights, v) = LineLanes::of(s, lines).cell(s, p.z);
+        Quad::new(s, [u, v], zero.simd_eq(zero)).corners(
+            #[inline(always)]
+            |right, upper| {
+                let (x, y) = (pick(right, cosines), pick(right, sines));
+                (V3 { x: x * radius, y: y * radius, z: pick(upper, heights) }, V3 { x, y, z: zero })
+            },
+        )
     }
 }
 
-/// Triangles of sixteen points.
-#[derive(Clone, Debug)]
-struct CornerArrays {
-    positions: [[[f32; LANES]; 3]; 3],
-    normals: [[[f32; LANES]; 3]; 3],
-    shares: [[f32; LANES]; 3],
-}
-
-/// Triangles of the selected lanes. Lanes of other instances copy one, so that all numbers stay finite.
-#[inline(always)]
-fn corners_of_lanes(lanes: u64, of: impl Fn(usize) -> Corners) -> CornerArrays {
-    let zero = [[0.0f32; LANES]; 3];
-    let mut out = CornerArrays { positions: [zero; 3], normals: [zero; 3], shares: zero };
-    let fill = (lanes.trailing_zeros() as usize).min(LANES - 1);
-    let first = of(fill);
-    for k in 0..LANES {
-        let one = if lanes >> k & 1 == 1 && k != fill { of(k) } else { first };
-        for c in 0..3 {
-            for axis in 0..3 {
-                out.positions[c][axis][k] = one.positions[c][axis];
-                out.normals[c][axis][k] = one.normals[c][axis];
-            }
-            out.shares[c][k] = one.shares[c];
+impl<S: Simd> CornerLanes<S> {
+    /// The same corners in the world.
+    #[inline(always)]
+    fn into_world(self, s: S, source: &InstanceSurface<'_>) -> Self {
+        let world = source.world_from_instance;
+        let from = V3::splat(s, world.translation);
+        let ([a, b, c], [l, m, n]) = (self.positions, self.normals);
+        let positions = [
+            a.rotate(&world.rotation).add(from),
+            b.rotate(&world.rotation).add(from),
+            c.rotate(&world.rotation).add(from),
+        ];
+        Self {
+            positions,
+            normals: [l.rotate(&world.rotation), m.rotate(&world.rotation), n.rotate(&world.rotation)],
+            ..self
         }
     }
-    out
-}
 
-fn unit_vector(v: [f32; 3]) -> [f32; 3] {
-    let length = (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]).sqrt();
-    v.map(|x| x / length)
-}
-
-/// Triangle of a quadrilateral at fractions of its width and height. OpenGL splits it from the lower right to the upper
-/// left corner if `is_anti`, else from the lower left to the upper right one. `corner` has the position and the normal
-/// of a corner: right or not, upper or not.
-fn quad([s, t]: [f32; 2], is_anti: bool, corner: impl Fn(bool, bool) -> ([f32; 3], [f32; 3])) -> Corners {
-    let (corners, shares) = if is_anti {
-        let upper = s + t > 1.0;
-        let shares = if upper { [1.0 - t, 1.0 - s, s + t - 1.0] } else { [s, t, 1.0 - s - t] };
-        ([(true, false), (false, true), (upper, upper)], shares)
-    } else {
-        let right = s > t;
-        let shares = if right { [1.0 - s, t, s - t] } else { [1.0 - t, s, t - s] };
-        ([(false, false), (true, true), (right, !right)], shares)
-    };
-    let ends = corners.map(|(u, v)| corner(u, v));
-    Corners { positions: ends.map(|(position, _)| position), normals: ends.map(|(_, normal)| normal), shares }
-}
-
-/// Triangle of a mesh at a point of it.
-fn of_mesh(mesh: &RenderMesh, triangle: usize, point: [f32; 3]) -> Corners {
-    let corners = mesh.triangles()[triangle].map(|i| i as usize);
-    let positions = corners.map(|i| mesh.positions()[i]);
-    let sub = |a: [f32; 3], b: [f32; 3]| [0, 1, 2].map(|k| a[k] - b[k]);
-    let cross =
-        |a: [f32; 3], b: [f32; 3]| [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
-    let dot = |a: [f32; 3], b: [f32; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-    let [ab, ac, w] = [positions[1], positions[2], point].map(|p| sub(p, positions[0]));
-    let normal = cross(ab, ac);
-    let area = dot(normal, normal);
-    let inverse = if area > 0.0 { 1.0 / area } else { 0.0 };
-    let b = (dot(cross(w, ac), normal) * inverse).clamp(0.0, 1.0);
-    let c = (dot(cross(ab, w), normal) * inverse).clamp(0.0, 1.0 - b);
-    Corners { positions, normals: corners.map(|i| mesh.normals()[i]), shares: [1.0 - b - c, b, c] }
-}
-
-/// Angle of the vector (x, y) from the x axis \[deg\], -180 to 180: a polynomial, within 0.001 degrees, because `atan2`
-/// differs from machine to machine. Source of the polynomial: a minimax fit of the arc tangent on 0..=1.
-fn angle(y: f32, x: f32) -> f32 {
-    let (ax, ay) = (x.abs(), y.abs());
-    let (small, large) = if ax < ay { (ax, ay) } else { (ay, ax) };
-    if large <= 0.0 {
-        return 0.0;
+    /// `a` where the mask is set, else `b`.
+    #[inline(always)]
+    fn select(m: M<S>, a: Self, b: Self) -> Self {
+        let v3 = {
+            #[inline(always)]
+            |a: [V3<S>; 3], b: [V3<S>; 3]| {
+                [V3::select(m, a[0], b[0]), V3::select(m, a[1], b[1]), V3::select(m, a[2], b[2])]
+            }
+        };
+        let (p, q) = (a.shares, b.shares);
+        Self {
+            positions: v3(a.positions, b.positions),
+            normals: v3(a.normals, b.normals),
+            shares: [select(m, p[0], q[0]), select(m, p[1], q[1]), select(m, p[2], q[2])],
+        }
     }
-    let r = small / large;
+}
+
+/// The second of two ends where the mask is set, else the first.
+#[inline(always)]
+fn pick<S: Simd>(second: M<S>, [a, b]: [F<S>; 2]) -> F<S> {
+    select(second, b, a)
+}
+
+/// [`PlaneLines`] of sixteen points.
+#[derive(Clone, Copy)]
+struct LineLanes<S: Simd> {
+    reach: F<S>,
+    step: F<S>,
+    border: F<S>,
+}
+
+impl<S: Simd> LineLanes<S> {
+    #[inline(always)]
+    fn of(s: S, lines: PlaneLines) -> Self {
+        Self { reach: splat(s, lines.reach), step: splat(s, lines.step), border: splat(s, lines.border) }
+    }
+
+    /// [`PlaneLines::cell`]: the two lines around coordinates, and the fractions of the way between them.
+    #[inline(always)]
+    fn cell(self, s: S, x: F<S>) -> ([F<S>; 2], F<S>) {
+        let Self { reach, step, border } = self;
+        let (zero, one) = (splat(s, 0.0), splat(s, 1.0));
+        let line = floor_lanes(s, (x + reach) / step);
+        let (before, behind) = (x.simd_lt(-reach), x.simd_ge(reach));
+        let low = select(before, -border, select(behind, reach, line * step - reach));
+        let high = select(before, -reach, select(behind, border, (line + 1.0) * step - reach));
+        let width = high - low;
+        let is_wide = width.simd_gt(zero);
+        let fraction = (x - low) / select(is_wide, width, one);
+        ([low, high], select(is_wide, min(max(fraction, zero), one), zero))
+    }
+}
+
+/// Triangles of quadrilaterals at fractions of their width and height. OpenGL splits some from the lower right to the
+/// upper left corner, others from the lower left to the upper right one.
+#[derive(Clone, Copy)]
+struct Quad<S: Simd> {
+    /// Masks of the corners that are right, and upper.
+    right: [M<S>; 3],
+    upper: [M<S>; 3],
+    shares: [F<S>; 3],
+}
+
+impl<S: Simd> Quad<S> {
+    /// `is_anti` is set for those that are split from the lower right to the upper left corner.
+    #[inline(always)]
+    fn new(s: S, [u, v]: [F<S>; 2], is_anti: M<S>) -> Self {
+        let one = splat(s, 1.0);
+        let (nothing, everything) = (one.simd_lt(one), one.simd_eq(one));
+        let (is_upper, is_right) = ((u + v).simd_gt(one), u.simd_gt(v));
+        let anti =
+            [select(is_upper, one - v, u), select(is_upper, one - u, v), select(is_upper, u + v - 1.0, one - u - v)];
+        let other = [select(is_right, one - u, one - v), select(is_right, v, u), select(is_right, u - v, v - u)];
+        Self {
+            right: [is_anti, !is_anti, (is_anti & is_upper) | (!is_anti & is_right)],
+            upper: [nothing, everything, (is_anti & is_upper) | !(is_anti | is_right)],
+            shares: [
+                select(is_anti, anti[0], other[0]),
+                select(is_anti, anti[1], other[1]),
+                select(is_anti, anti[2], other[2]),
+            ],
+        }
+    }
+
+    /// The corners; `corner` has the position and the normal of a corner: right or not, upper or not.
+    #[inline(always)]
+    fn corners(self, corner: impl Fn(M<S>, M<S>) -> (V3<S>, V3<S>)) -> CornerLanes<S> {
+        let Self { right, upper, shares } = self;
+        let ends = [corner(right[0], upper[0]), corner(right[1], upper[1]), corner(right[2], upper[2])];
+        let [(a, l), (b, m), (c, n)] = ends;
+        CornerLanes { positions: [a, b, c], normals: [l, m, n], shares }
+    }
+}
+
+/// Both numbers of the entries of a table around fractions of its length, and the fractions between them.
+#[inline(always)]
+fn ends_of<S: Simd>(s: S, table: &[[f32; 2]], fraction: F<S>) -> ([F<S>; 2], [F<S>; 2], F<S>) {
+    let count = table.len().saturating_sub(1).max(1) as f32;
+    let (zero, one) = (splat(s, 0.0), splat(s, 1.0));
+    let at = fraction * count;
+    // Also for lanes of other instances, whose numbers may be anything.
+    let index = max(min(floor_lanes(s, at), splat(s, count - 1.0)), zero);
+    let indices: [i32; LANES] = index.to_int().array();
+    let mut ends = [[[0.0f32; LANES]; 2]; 2];
+    for (k, &index) in indices.iter().enumerate() {
+        for (end, entry) in table.iter().skip(index as usize).take(2).enumerate() {
+            (ends[0][end][k], ends[1][end][k]) = (entry[0], entry[1]);
+        }
+    }
+    let [[a, b], [c, d]] = &ends;
+    ([load(s, a), load(s, b)], [load(s, c), load(s, d)], min(max(at - index, zero), one))
+}
+
+/// Triangles of a mesh at points of it, in the world. Lanes that are not in `lanes` copy one that is.
+#[inline(never)]
+fn of_mesh<S: Simd>(
+    s: S,
+    source: &InstanceSurface<'_>,
+    mesh: &RenderMesh,
+    triangle: &[u32; LANES],
+    point: V3<S>,
+    lanes: u64,
+) -> CornerLanes<S> {
+    s.vectorize(
+        #[inline(always)]
+        || {
+            let zero = [[0.0f32; LANES]; 3];
+            let (mut p, mut n) = ([zero; 3], [zero; 3]);
+            let fill = (lanes.trailing_zeros() as usize).min(LANES - 1);
+            let (positions, normals) = (mesh.positions(), mesh.normals());
+            for k in 0..LANES {
+                let from = if lanes >> k & 1 == 1 { k } else { fill };
+                let corners = mesh.triangles()[triangle[from] as usize];
+                for (c, &corner) in corners.iter().enumerate() {
+                    let (position, normal) = (positions[corner as usize], normals[corner as usize]);
+                    for axis in 0..3 {
+                        (p[c][axis][k], n[c][axis][k]) = (position[axis], normal[axis]);
+                    }
+                }
+            }
+            let v3 = {
+                #[inline(always)]
+                |a: &[[f32; LANES]; 3]| V3 { x: load(s, &a[0]), y: load(s, &a[1]), z: load(s, &a[2]) }
+            };
+            let [a, b, c] = [v3(&p[0]), v3(&p[1]), v3(&p[2])];
+            let (ab, ac, w) = (b.sub(a), c.sub(a), point.sub(a));
+            let normal = ab.cross(ac);
+            let area = normal.dot(normal);
+            let (zero, one) = (splat(s, 0.0), splat(s, 1.0));
+            let has_area = area.simd_gt(zero);
+            let inverse = select(has_area, 1.0 / select(has_area, area, one), zero);
+            let kb = min(max(w.cross(ac).dot(normal) * inverse, zero), one);
+            let kc = min(max(ab.cross(w).dot(normal) * inverse, zero), one - kb);
+            let corners = CornerLanes {
+                positions: [a, b, c],
+                normals: [v3(&n[0]), v3(&n[1]), v3(&n[2])],
+                shares: [one - kb - kc, kb, kc],
+            };
+            corners.into_world(s, source)
+        },
+    )
+}
+
+/// Angles of the vectors (x, y) from the x axis \[deg\], -180 to 180: a polynomial, within 0.001 degrees, because `atan2`
+/// differs from machine to machine. Source of the polynomial: a minimax fit of the arc tangent on 0..=1.
+#[inline(always)]
+fn angle<S: Simd>(s: S, y: F<S>, x: F<S>) -> F<S> {
+    let (ax, ay) = (abs(x), abs(y));
+    let (zero, one) = (splat(s, 0.0), splat(s, 1.0));
+    let is_steep = ax.simd_lt(ay);
+    let (small, large) = (select(is_steep, ax, ay), select(is_steep, ay, ax));
+    let r = small / select(large.simd_gt(zero), large, one);
     let k = r * r;
-    let series = ((((-0.011_721_2 * k + 0.052_653_32) * k - 0.116_432_87) * k + 0.193_543_46) * k - 0.332_623_47) * k;
+    let series = ((((k * -0.011_721_2 + 0.052_653_32) * k - 0.116_432_87) * k + 0.193_543_46) * k - 0.332_623_47) * k;
     let deg = (series + 0.999_977_26) * r * (180.0 / std::f32::consts::PI);
-    let deg = if ax < ay { 90.0 - deg } else { deg };
-    let deg = if x < 0.0 { 180.0 - deg } else { deg };
-    if y < 0.0 { -deg } else { deg }
+    let deg = select(is_steep, 90.0 - deg, deg);
+    let deg = select(x.simd_lt(zero), 180.0 - deg, deg);
+    select(y.simd_lt(zero), -deg, deg)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::simd::{all_levels, at_level};
     use kinetoscope_scene::shape::{Box, Capsule, Cylinder, Ellipsoid, Plane, Sphere};
 
     const QUALITY: Tessellation = Tessellation { slices: 28, stacks: 16, quads: 4 };
@@ -312,12 +455,40 @@ mod tests {
 
     #[test]
     fn angles() {
-        for k in -1800..1800 {
-            let deg = f64::from(k) / 10.0;
-            let (y, x) = (deg.to_radians().sin() * 0.7, deg.to_radians().cos() * 0.7);
-            assert!((f64::from(angle(y as f32, x as f32)) - deg).abs() < 2e-3, "{deg}");
+        for level in all_levels() {
+            at_level!(level, s => {
+                for first in (-1800..1800).step_by(LANES) {
+                    let deg: [f64; LANES] = std::array::from_fn(|k| (first + k as i32) as f64 / 10.0);
+                    let (y, x) = (deg.map(|deg| deg.to_radians().sin() as f32 * 0.7),
+                        deg.map(|deg| deg.to_radians().cos() as f32 * 0.7));
+                    let found = angle(s, load(s, &y), load(s, &x)).array();
+                    for (found, deg) in found.into_iter().zip(deg) {
+                        assert!((f64::from(found) - deg).abs() < 2e-3, "{deg}: {found}");
+                    }
+                }
+                assert_eq!(angle(s, splat(s, 0.0), splat(s, 0.0)).array(), [0.0; LANES]);
+            });
         }
-        assert_eq!(angle(0.0, 0.0), 0.0);
+    }
+
+    /// A triangle at a point.
+    #[derive(Debug)]
+    struct Corners {
+        positions: [[f32; 3]; 3],
+        normals: [[f32; 3]; 3],
+        shares: [f32; 3],
+    }
+
+    impl Corners {
+        fn of<S: Simd>(lanes: &CornerLanes<S>, k: usize) -> Self {
+            let at = |v: &V3<S>| [v.x.array()[k], v.y.array()[k], v.z.array()[k]];
+            let [a, b, c] = &lanes.shares;
+            Self {
+                positions: lanes.positions.each_ref().map(at),
+                normals: lanes.normals.each_ref().map(at),
+                shares: [a.array()[k], b.array()[k], c.array()[k]],
+            }
+        }
     }
 
     /// The corners are points of the shape with its normals, near the point, which is their weighted mean but for the
@@ -338,50 +509,95 @@ mod tests {
             [PlaneLines { reach: 0.75, step: 0.5, border: 1.0 }, PlaneLines { reach: 1.5, step: 0.5, border: 2.0 }];
         let mut rng = crate::geometry::TestRng(7);
         for (shape, height, edge) in &shapes {
-            let mut seen = std::collections::HashSet::new();
+            let mut hits = Vec::new();
             for _ in 0..20_000 {
                 let target = rng.point(1.0);
                 let origin = [target[0] * 0.3, target[1] * 0.3, 3.0];
                 let direction = [target[0] - origin[0], target[1] - origin[1], -3.0];
                 let length = direction.iter().map(|x| x * x).sum::<f64>().sqrt();
                 let ray = kinetoscope_scene::Ray { origin, direction: direction.map(|x| x / length) };
-                let Some(hit) = shape.intersect(&ray, f64::INFINITY) else { continue };
-                let point = ray.at(hit.t).map(|x| x as f32);
-                let found = tables.of_shape(shape, lines, point, hit.normal.map(|x| x as f32));
-                let dot = |a: [f32; 3], b: [f32; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-                let mean = [0, 1, 2].map(|k| (0..3).map(|c| found.shares[c] * found.positions[c][k]).sum::<f32>());
-                let off = [0, 1, 2].map(|k| mean[k] - point[k]);
-                assert!(dot(off, off).sqrt() < *height, "{} {point:?} {found:?}", shape.name());
-                assert!((found.shares.iter().sum::<f32>() - 1.0).abs() < 1e-5);
-                assert!(found.shares.iter().all(|&x| x >= -1e-5));
-                for c in 0..3 {
-                    let to = [0, 1, 2].map(|k| found.positions[c][k] - point[k]);
-                    assert!(dot(to, to).sqrt() < *edge, "{} {point:?} {found:?}", shape.name());
-                    assert!((dot(found.normals[c], found.normals[c]) - 1.0).abs() < 1e-5);
-                    assert!(dot(found.normals[c], hit.normal.map(|x| x as f32)) > 0.9, "{} {found:?}", shape.name());
-                }
-                seen.insert(found.positions.map(|p| p.map(|x| (x * 1e4).round() as i32)));
+                let hit = shape.intersect(&ray, f64::INFINITY);
+                hits.extend(hit.map(|hit| [ray.at(hit.t), hit.normal].map(|v| v.map(|x| x as f32))));
             }
-            assert!(seen.len() > 30, "{}: {}", shape.name(), seen.len());
+            for level in all_levels() {
+                let mut seen = std::collections::HashSet::new();
+                for sixteen in hits.as_chunks::<LANES>().0 {
+                    let lanes = |which: usize, axis: usize| sixteen.map(|hit| hit[which][axis]);
+                    let found: Vec<Corners> = at_level!(level, s => {
+                        let v3 = |which: usize| V3 {
+                            x: load(s, &lanes(which, 0)),
+                            y: load(s, &lanes(which, 1)),
+                            z: load(s, &lanes(which, 2)),
+                        };
+                        let found = tables.of_shape(s, shape, lines, v3(0), v3(1));
+                        (0..LANES).map(|k| Corners::of(&found, k)).collect()
+                    });
+                    for ([point, normal], found) in sixteen.iter().zip(&found) {
+                        let dot = |a: [f32; 3], b: [f32; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+                        let mean =
+                            [0, 1, 2].map(|k| (0..3).map(|c| found.shares[c] * found.positions[c][k]).sum::<f32>());
+                        let off = [0, 1, 2].map(|k| mean[k] - point[k]);
+                        assert!(dot(off, off).sqrt() < *height, "{} {point:?} {found:?}", shape.name());
+                        assert!((found.shares.iter().sum::<f32>() - 1.0).abs() < 1e-5);
+                        assert!(found.shares.iter().all(|&x| x >= -1e-5));
+                        for c in 0..3 {
+                            let to = [0, 1, 2].map(|k| found.positions[c][k] - point[k]);
+                            assert!(dot(to, to).sqrt() < *edge, "{} {point:?} {found:?}", shape.name());
+                            assert!((dot(found.normals[c], found.normals[c]) - 1.0).abs() < 1e-5);
+                            assert!(dot(found.normals[c], *normal) > 0.9, "{} {found:?}", shape.name());
+                        }
+                        seen.insert(found.positions.map(|p| p.map(|x| (x * 1e4).round() as i32)));
+                    }
+                }
+                assert!(seen.len() > 30, "{}: {}", shape.name(), seen.len());
+            }
+        }
+    }
+
+    /// The lines around coordinates are those of [`PlaneLines::cell`].
+    #[test]
+    fn cells() {
+        let lines = PlaneLines { reach: 1.0, step: 0.5, border: 1.25 };
+        for first in (-140..140).step_by(LANES) {
+            let x: [f32; LANES] = std::array::from_fn(|k| 0.01 * (first + k as i32) as f32);
+            for level in all_levels() {
+                at_level!(level, s => {
+                    let ([low, high], fraction) = LineLanes::of(s, lines).cell(s, load(s, &x));
+                    let found = [low, high, fraction].map(|lanes| lanes.array());
+                    for (k, &x) in x.iter().enumerate() {
+                        let (ends, fraction) = lines.cell(x);
+                        assert_eq!(found.map(|lanes| lanes[k]), [ends[0], ends[1], fraction], "{x}");
+                    }
+                });
+            }
         }
     }
 
     /// Interpolation is continuous across both diagonals of a quadrilateral, and exact at its corners.
     #[test]
     fn diagonals() {
-        let value = |s: f32, t: f32, anti: bool| {
-            let found =
-                quad([s, t], anti, |u, v| ([f32::from(u8::from(u)), 3.0 * f32::from(u8::from(v)), 0.0], [0.0; 3]));
-            (0..3).map(|c| found.shares[c] * (found.positions[c][0] * found.positions[c][1])).sum::<f32>()
-        };
-        for anti in [false, true] {
-            assert_eq!(
-                [value(0., 0., anti), value(1., 0., anti), value(0., 1., anti), value(1., 1., anti)],
-                [0., 0., 0., 3.]
-            );
+        for level in all_levels() {
+            let value = |u: f32, v: f32, anti: bool| {
+                at_level!(level, s => {
+                    let (zero, one) = (splat(s, 0.0), splat(s, 1.0));
+                    let is_anti = if anti { one.simd_eq(one) } else { one.simd_eq(zero) };
+                    let found = Quad::new(s, [splat(s, u), splat(s, v)], is_anti).corners(|right, upper| {
+                        let at = V3 { x: pick(right, [zero, one]), y: pick(upper, [zero, splat(s, 3.0)]), z: zero };
+                        (at, at)
+                    });
+                    let Corners { positions, shares, .. } = Corners::of(&found, 5);
+                    (0..3).map(|c| shares[c] * (positions[c][0] * positions[c][1])).sum::<f32>()
+                })
+            };
+            for anti in [false, true] {
+                assert_eq!(
+                    [value(0., 0., anti), value(1., 0., anti), value(0., 1., anti), value(1., 1., anti)],
+                    [0., 0., 0., 3.]
+                );
+            }
+            // In the middle: on the diagonal between the corners with 0, or with 0 and 3.
+            assert_eq!([value(0.5, 0.5, true), value(0.5, 0.5, false)], [0.0, 1.5]);
+            assert!((value(0.501, 0.5, true) - value(0.499, 0.5, true)).abs() < 0.01);
         }
-        // In the middle: on the diagonal between the corners with 0, or with 0 and 3.
-        assert_eq!([value(0.5, 0.5, true), value(0.5, 0.5, false)], [0.0, 1.5]);
-        assert!((value(0.501, 0.5, true) - value(0.499, 0.5, true)).abs() < 0.01);
     }
 }

@@ -25,10 +25,16 @@ pub(crate) struct ShadowMap {
     limits: Option<[[f32; 2]; 2]>,
     /// Width of a texel on a surface \[m\]: at any depth, or at depth 1 for a spot.
     texel: f32,
-    /// Nearness at each texel, row by row: the taps of a point are contiguous in four rows.
+    /// Nearness at each texel, row by row: the taps of a point are contiguous in four rows. Rows have [`side`](Self::side)
+    /// texels, of which the first ones are in use.
     nearness: Vec<f32>,
     /// Smallest and largest nearness in each block of texels: for most points, all texels are lit, or none.
     range: Vec<[f32; 2]>,
+    /// True for blocks of `nearness` that hold the nearness of an empty texel, [`empty`](Self::empty), whatever they were
+    /// used for: most of a map is empty, in every frame, and is not written again.
+    is_empty: Vec<bool>,
+    /// Nearness of an empty texel.
+    empty: f32,
 }
 
 /// Rows of a map that are rendered together, with their inputs.
@@ -40,8 +46,11 @@ pub(crate) struct ShadowBand<'a> {
     first: usize,
     /// Largest number of texels of a band, for any crop of the map.
     max_texels: usize,
+    /// Texels from row to row.
+    side: usize,
     nearness: &'a mut [f32],
     range: &'a mut [[f32; 2]],
+    is_empty: &'a mut [bool],
 }
 
 /// Rows of blocks of a map that are rendered together; a quarter of small maps, so that the scratch memory is smaller
@@ -80,11 +89,15 @@ impl ShadowMap {
             texel: 1.0,
             nearness: Vec::new(),
             range: Vec::new(),
+            is_empty: Vec::new(),
+            empty: 0.0,
         }
     }
 
     pub(crate) fn bytes(&self) -> usize {
-        self.list.bytes() + size_of::<f32>() * (self.nearness.capacity() + 2 * self.range.capacity())
+        self.list.bytes()
+            + size_of::<f32>() * (self.nearness.capacity() + 2 * self.range.capacity())
+            + self.is_empty.capacity()
     }
 
     /// Finds the casters between the light and the `receivers`, on a map of up to `side` by `side` texels, without
@@ -105,9 +118,14 @@ impl ShadowMap {
         // Reserves the whole map and all casters at once: casters move, and memory must not grow with it.
         let parts = if cfg.lod { Granularity::LodClusters } else { Granularity::FullClusters };
         self.list.reserve(scene, parts, |i| if solid(i) { Layer::Opaque } else { Layer::Hidden });
-        self.nearness.reserve_exact((side * side).saturating_sub(self.nearness.len()));
-        self.range.reserve_exact((side / BLOCK).pow(2).saturating_sub(self.range.len()));
-        self.side = side;
+        if self.side != side {
+            let blocks = (side / BLOCK).pow(2).max(self.range.len());
+            self.nearness.resize(blocks * BLOCK_AREA, 0.0);
+            self.range.resize(blocks, [0.0; 2]);
+            self.is_empty.resize(blocks, false);
+            self.is_empty.fill(false);
+            self.side = side;
+        }
         let Some((projection, planes)) = light.fit(scene, poses, receivers, side, solid) else { return false };
         let rotation = light.rotation;
         let casts = |i: &Instance| solid(i) && (planes || !matches!(i.shape, Shape::Plane(_)));
@@ -123,14 +141,12 @@ impl ShadowMap {
             parts,
             |i| if casts(i) { Layer::Opaque } else { Layer::Hidden },
         );
-        if !self.crop() {
-            return false;
+        let empty = projection.farthest();
+        if self.empty != empty {
+            self.is_empty.fill(false);
+            self.empty = empty;
         }
-        let Projection { width, height, .. } = self.projection;
-        // Rendering overwrites all of it.
-        self.nearness.resize(width * height, 0.0);
-        self.range.resize((width / BLOCK) * (height / BLOCK), [0.0; 2]);
-        true
+        self.crop()
     }
 
     /// Samples of a tile that can hold any band of the map, even if the map is not in use now.
@@ -166,19 +182,23 @@ impl ShadowMap {
 
     /// Bands of the map, which can be rendered independently.
     pub(crate) fn bands(&mut self) -> impl Iterator<Item = ShadowBand<'_>> {
-        let Self { projection, list, nearness, range, side, .. } = self;
-        let (projection, list) = (&*projection, &*list);
-        let max_texels = max_band_texels(*side);
-        let rows = rows_of_bands([projection.width, projection.height]);
-        let parts = nearness.chunks_mut(rows * BLOCK * projection.width);
-        let parts = parts.zip(range.chunks_mut(rows * (projection.width / BLOCK)));
-        parts.enumerate().map(move |(k, (nearness, range))| ShadowBand {
+        let Self { projection, list, nearness, range, is_empty, side, .. } = self;
+        let (projection, list, side) = (&*projection, &*list, *side);
+        let max_texels = max_band_texels(side);
+        let Projection { width, height, .. } = *projection;
+        let (rows, blocks) = (rows_of_bands([width, height]), height / BLOCK * (side / BLOCK));
+        let step = rows * (side / BLOCK);
+        let parts = nearness[..blocks * BLOCK_AREA].chunks_mut(step * BLOCK_AREA);
+        let parts = parts.zip(range[..blocks].chunks_mut(step)).zip(is_empty[..blocks].chunks_mut(step));
+        parts.enumerate().map(move |(k, ((nearness, range), is_empty))| ShadowBand {
             projection,
             list,
             first: k * rows,
             max_texels,
+            side,
             nearness,
             range,
+            is_empty,
         })
     }
 
@@ -230,7 +250,7 @@ impl ShadowMap {
         if (x1 + 1 - x0) * (y1 + 1 - y0) <= 12 {
             let (mut low, mut high) = (f32::MAX, f32::MIN);
             for row in y0..=y1 {
-                let first = row * (p.width / BLOCK);
+                let first = row * (self.side / BLOCK);
                 for &[l, h] in &self.range[first + x0..=first + x1] {
                     (low, high) = (if l < low { l } else { low }, if h > high { h } else { high });
                 }
@@ -257,7 +277,7 @@ impl ShadowMap {
     /// texels.
     #[inline(always)]
     fn taps(&self, [column, row]: [usize; 2], fx: f32, fy: f32, q: f32) -> f32 {
-        let width = self.projection.width;
+        let width = self.side;
         let mut lit = [0.0f32; 4];
         for (k, weight) in [1.0 - fy, 1.0, 1.0, fy].into_iter().enumerate() {
             let first = (row + k - 1) * width + column - 1;
@@ -280,31 +300,48 @@ impl ShadowBand<'_> {
         tile: &mut Tile,
         rasterizer: &mut VisibilityRasterizer,
     ) {
-        let Self { projection, list, first, max_texels, nearness, range } = self;
+        let Self { projection, list, first, max_texels, side, nearness, range, is_empty } = self;
         let wide = projection.width / BLOCK;
-        let rows = range.len() / wide;
+        let rows = range.len() / (side / BLOCK);
         tile.reserve(max_texels);
         tile.clear([0, first * BLOCK], [wide, rows], 1, projection.farthest());
         at_level!(level, s => {
             for item in &list.opaque {
                 rasterizer.draw(s, tile, projection, scene, &list.placed, item);
             }
-            tile.finish();
             s.vectorize(
                 #[inline(always)]
-                || unfold(s, tile, nearness, range),
+                || unfold(s, tile, side, nearness, range, is_empty),
             );
         });
     }
 }
 
-/// Copies the blocks of a tile into rows, and writes the smallest and largest nearness of each block to `range`.
+/// Copies the blocks of a tile into rows of `side` texels, and writes the smallest and largest nearness of each block to
+/// `range`. Blocks that are empty, and were so before, are not written.
 #[inline(always)]
-fn unfold<S: Simd>(s: S, tile: &Tile, nearness: &mut [f32], range: &mut [[f32; 2]]) {
-    let side = tile.blocks_x * BLOCK;
-    let lines = nearness.chunks_exact_mut(BLOCK * side).zip(range.chunks_exact_mut(tile.blocks_x));
-    for ((lines, range), blocks) in lines.zip(tile.nearness.chunks_exact(BLOCK_AREA * tile.blocks_x)) {
-        for (bx, (block, range)) in blocks.chunks_exact(BLOCK_AREA).zip(range).enumerate() {
+fn unfold<S: Simd>(
+    s: S,
+    tile: &Tile,
+    side: usize,
+    nearness: &mut [f32],
+    range: &mut [[f32; 2]],
+    is_empty: &mut [bool],
+) {
+    let lines = nearness.chunks_exact_mut(BLOCK * side);
+    let blocks = range.chunks_exact_mut(side / BLOCK).zip(is_empty.chunks_exact_mut(side / BLOCK));
+    for (by, (lines, (range, is_empty))) in lines.zip(blocks).enumerate() {
+        for (bx, (range, is_empty)) in range.iter_mut().zip(is_empty).take(tile.blocks_x).enumerate() {
+            let block = by * tile.blocks_x + bx;
+            if let Some(empty) = tile.cleared_nearness(block) {
+                *range = [empty; 2];
+                if !std::mem::replace(is_empty, true) {
+                    write_block(lines, side, bx, &[[empty; BLOCK]; BLOCK]);
+                }
+                continue;
+            }
+            *is_empty = false;
+            let block = &tile.nearness[tile.samples(block, 0)..][..BLOCK_AREA];
             let (mut low, mut high) = (load(s, block), load(s, block));
             for two in block.chunks_exact(LANES) {
                 (low, high) = (min(load(s, two), low), max(load(s, two), high));
@@ -314,12 +351,17 @@ fn unfold<S: Simd>(s: S, tile: &Tile, nearness: &mut [f32], range: &mut [[f32; 2
             for (&l, &h) in lows.iter().zip(&highs) {
                 *range = [if l < range[0] { l } else { range[0] }, if h > range[1] { h } else { range[1] }];
             }
-            // Arrays, because slices of unknown length are copied by a call.
-            for (row, from) in block.as_chunks::<BLOCK>().0.iter().enumerate() {
-                if let Some(to) = lines[row * side + bx * BLOCK..].first_chunk_mut() {
-                    *to = *from;
-                }
-            }
+            write_block(lines, side, bx, block.as_chunks::<BLOCK>().0);
+        }
+    }
+}
+
+/// Writes a block to rows of `side` texels. Rows are arrays, because slices of unknown length are copied by a call.
+#[inline(always)]
+fn write_block(lines: &mut [f32], side: usize, bx: usize, rows: &[[f32; BLOCK]]) {
+    for (row, from) in rows.iter().enumerate() {
+        if let Some(to) = lines[row * side + bx * BLOCK..].first_chunk_mut() {
+            *to = *from;
         }
     }
 }

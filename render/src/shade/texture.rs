@@ -38,7 +38,7 @@ impl MipRule {
 
 /// Rounds down to an integer.
 #[inline(always)]
-fn floor_lanes<S: Simd>(s: S, x: F<S>) -> F<S> {
+pub(crate) fn floor_lanes<S: Simd>(s: S, x: F<S>) -> F<S> {
     let r = (x + ROUND) - ROUND;
     r - select(r.simd_gt(x), splat(s, 1.0), splat(s, 0.0))
 }

@@ -107,13 +107,14 @@ fn passes_are_clamped() {
     let floor = Material { texture: texture(51), ..matte([1.0; 3]) };
     let headlight = Light { direction: [0.0, 0.0, -1.0], diffuse: [1.7; 3], cast_shadow: false, ..sun(0.0, 0.0) };
     for renderer in [Renderer::Raster, Renderer::Hybrid] {
-        let draw = |shadows: bool| {
-            let own = Light { cast_shadow: shadows, ..sun(1.0 / COSINE * 0.8, 0.0) };
+        let draw = |shadows: bool, strength: f32| {
+            let own = Light { cast_shadow: shadows, ..sun(strength / COSINE, 0.0) };
             floor_and_plate(floor.clone(), Some(RULES), vec![headlight, own]).with_renderer(renderer)
         };
-        // 1.7 is clamped to 1; the second pass adds 0.8. In one pass, all is clamped to 1.
-        assert_red(&draw(true), LIT, 0.2 * 1.8);
-        assert_red(&draw(false), LIT, 0.2);
+        // 1.7 is clamped to 1; the second pass adds 0.8, or 1.3, which is clamped to 1. In one pass, all is clamped to 1.
+        assert_red(&draw(true, 0.8), LIT, 0.2 * 1.8);
+        assert_red(&draw(true, 1.3), LIT, 0.2 * 2.0);
+        assert_red(&draw(false, 0.8), LIT, 0.2);
     }
 }
 
@@ -398,5 +399,74 @@ fn images_on_faces() {
         assert_eq!(later.color(), alone.color(), "{eye:?}");
         assert!(later.depth() == alone.depth() && earlier.depth() == alone.depth());
         assert!(earlier.mask().iter().all(|&id| id != 1) && later.mask().iter().all(|&id| id != 1), "{eye:?}");
+    }
+}
+
+/// The mip levels of a texture follow from the derivatives of the surface point by the image coordinates, of which the
+/// larger one counts: not from the distance along the ray, nor from its angle with the surface.
+///
+/// The texture is a row of a white and a black texel, so that the second level is gray. A pixel 1.4 texels wide, at the
+/// middle of a white texel, is white by the part of the first level: OpenGL's logarithm is 0.4854.
+#[test]
+fn widths_of_pixels() {
+    const TEXELS: f32 = 1.4;
+    let expected = (1.0 - TEXELS.log2()) + 0.5 * TEXELS.log2();
+    let pixels = [255, 255, 255, 0, 0, 0];
+    let texture = Arc::new(Texture::averaged_in(LightingSpace::Display, TextureKind::TwoD, 2, 1, 3, &pixels).unwrap());
+    let view = View::look_at([SIZE; 2], 1.6, [0.0, 0.0, 3.0], [0.0; 3], [0.0, 1.0, 0.0]).unwrap();
+    // Width of a pixel on a plane across the optical axis, anywhere in the image.
+    let width = 3.0 / view.fx;
+    let draw = |opengl: Option<OpenGlRules>, column: usize, turn: f32, width: f32| {
+        // Two texels in an image of the texture.
+        let images_per_meter = TEXELS / (2.0 * width);
+        let material = Material {
+            texture: Some(Arc::clone(&texture)),
+            tex_repeat: [2.0 * images_per_meter; 2],
+            tex_uniform: true,
+            emission: 1.0,
+            ..matte([1.0; 3])
+        };
+        let (sine, cosine) = turn.sin_cos();
+        let rotation = [[cosine, 0.0, sine], [0.0, 1.0, 0.0], [-sine, 0.0, cosine]];
+        let plane = (Shape::from(Plane { half: [40.0; 2] }), material, PoseF32 { rotation, translation: [0.0; 3] });
+        let mut frame = still([plane], opengl, Vec::new(), view);
+        frame.view = view;
+        // Moves the middle of a white texel to the pixel.
+        let (scale, offset) = (frame.scene.texture_scales()[0][0], frame.scene.texture_offsets()[0][0]);
+        let at = (0.25 - offset) / scale;
+        let x = (column as f32 + 0.5 - view.cx) * 3.0 / view.fx;
+        frame.poses[0].translation = [x - cosine * at, 0.0, sine * at];
+        f32::from(frame.draw().color()[SIZE / 2 * SIZE + column][0]) / 255.0
+    };
+    let near = |found: f32| assert!((found - expected).abs() < 0.012, "{found} {expected}");
+    let (middle, border) = (SIZE / 2, SIZE - 1);
+    near(draw(Some(RULES), middle, 0.0, width));
+    near(draw(Some(RULES), border, 0.0, width));
+    // Turned about y, a step along x is longer by the cosine.
+    near(draw(Some(RULES), middle, 0.7, width / 0.7f32.cos()));
+    // The control: without these rules, pixels at the border are wider by the angle of their rays.
+    assert!((draw(None, border, 0.0, width) - expected).abs() > 0.1);
+}
+
+/// By default, shadow maps have 512 to 2048 texels along a side, and those of other scenes 128 to 1024.
+#[test]
+fn texels_of_shadow_maps() {
+    for (opengl, size, side) in
+        [(Some(RULES), 40, 512), (Some(RULES), 100, 1024), (Some(RULES), 300, 2048), (None, 40, 128), (None, 300, 512)]
+    {
+        let draw = |shadow_size: usize| {
+            let mut frame = floor_and_plate(matte([0.5; 3]), opengl, vec![sun(0.8, 0.0)]);
+            let scale = size as f32 / SIZE as f32;
+            let View { fx, fy, cx, cy, .. } = frame.view;
+            let [fx, fy, cx, cy] = [fx, fy, cx, cy].map(|x| x * scale);
+            frame.view = View { width: size, height: size, fx, fy, cx, cy, ..frame.view };
+            frame.cfg.shadow_size = shadow_size;
+            frame.draw()
+        };
+        let image = draw(0);
+        assert_eq!(image.color(), draw(side).color(), "{size} {side}");
+        for other in [side / 2, 2 * side] {
+            assert_ne!(image.color(), draw(other).color(), "the control: {size} {other}");
+        }
     }
 }
