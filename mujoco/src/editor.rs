@@ -7,7 +7,7 @@
 use super::error::EngineError;
 use super::guard::guarded;
 use super::model::{Compiled, Model, Storage, array_pointer, set_buffers};
-use super::patch::{Field, Globals, ModelPatch, PatchLayout, PatchWords, fields_of, word};
+use super::patch::{Field, Globals, ModelPatch, PatchLayout, PatchValues, PatchWords, fields_of, word};
 use mujoco_sys as mj;
 use mujoco_sys::fields::model as fields;
 use mujoco_sys::fields::model::ModelArray;
@@ -277,13 +277,15 @@ impl ModelEditor {
     /// Returns the differences of the edited model from the compiled one; `None` without any. Patches of similar edits
     /// share the list of places, so some words of a patch may be those of the compiled model.
     pub fn patch(&mut self) -> Option<Arc<ModelPatch>> {
-        let (words, globals) = (self.differences(), Globals::of(self.copy.header()));
+        let globals = Globals::of(self.copy.header());
         let patch = match &self.last {
-            Some(last) => words.into_patch_like(last, &self.base, globals, |array, at| {
-                // SAFETY: a field of models of these sizes; only `&mut self` writes to the copy.
-                word(unsafe { bytes(self.copy.header(), array) }, at)
+            None => self.differences().into_patch(&self.base, globals),
+            Some(last) => self.patch_like(last, globals).or_else(|| {
+                self.differences().into_patch_near(last, &self.base, globals, |array, at| {
+                    // SAFETY: a field of models of these sizes; only `&mut self` writes to the copy.
+                    word(unsafe { bytes(self.copy.header(), array) }, at)
+                })
             }),
-            None => words.into_patch(&self.base, globals),
         };
         self.known = Some(match &patch {
             None => Known::Nowhere,
@@ -298,6 +300,20 @@ impl ModelEditor {
     fn fields(&self) -> &Arc<[Field]> {
         let is_compared = |field: &Field| !UNCOMPARED_PREFIXES.iter().any(|of| field.array.name.starts_with(of));
         self.fields.get_or_init(|| fields_of(self.base.compiled()).into_iter().filter(is_compared).collect())
+    }
+
+    /// The patch with the places `layout`; `None` if the copy differs from the compiled model elsewhere, in no word of an
+    /// array of `layout`, or in too few of the places.
+    fn patch_like(&self, layout: &Arc<PatchLayout>, globals: Globals) -> Option<Arc<ModelPatch>> {
+        let mut values = PatchValues::new(layout);
+        for field in &**self.fields() {
+            // SAFETY: a field of models of these sizes; only `&mut self` writes to the copy.
+            let mine = unsafe { bytes(self.copy.header(), &field.array) };
+            // SAFETY: as above; nothing writes to a compiled model.
+            let compiled = unsafe { bytes(self.base.compiled(), &field.array) };
+            values.push(field, mine, compiled)?;
+        }
+        values.into_patch(globals)
     }
 
     /// Collects the words in which the copy differs from the compiled model.

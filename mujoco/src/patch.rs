@@ -325,14 +325,15 @@ impl PatchWords {
         Some(Arc::new(ModelPatch { layout, values: self.values.into(), globals, welded }))
     }
 
-    /// Creates the patch as [`into_patch`](Self::into_patch) does, with the places of `last` if it has few others. Then
-    /// it has words that do not differ, too, which `read` returns.
+    /// Creates the patch as [`into_patch`](Self::into_patch) does, with the places of `last`, too, if they are few. Then
+    /// it has words that do not differ, which `read` returns.
     ///
     /// Numbers that differ by rounding alone, such as the constants of MuJoCo, are equal in some environments by
-    /// chance. The places of a draw therefore soon have all that ever differ, and environments share their list.
-    pub(super) fn into_patch_like(
-        mut self,
-        last: &Arc<PatchLayout>,
+    /// chance. The places of a draw therefore soon have all that ever differ, and environments share their list:
+    /// [`PatchValues`].
+    pub(super) fn into_patch_near(
+        self,
+        last: &PatchLayout,
         model: &Model,
         globals: Globals,
         read: impl Fn(&ModelArray, usize) -> u64,
@@ -342,22 +343,71 @@ impl PatchWords {
             return self.into_patch(model, globals);
         }
         let spans = last.merged_spans(&self.spans);
-        if 8 * word_count(&spans) > 9 * self.values.len() {
+        if !are_most(self.values.len(), word_count(&spans)) {
             return self.into_patch(model, globals);
         }
-        let layout = if spans[..] == last.spans[..] {
-            Arc::clone(last)
-        } else {
-            let storage = Arc::clone(model.storage());
-            Arc::new(PatchLayout { storage, fields: std::mem::take(&mut self.fields).into(), spans: spans.into() })
-        };
+        let storage = Arc::clone(model.storage());
+        let layout = PatchLayout { storage, fields: self.fields.into(), spans: spans.into() };
         let mut values = Vec::with_capacity(word_count(&layout.spans));
         layout.for_each_place(|array, places| values.extend(places.map(|at| read(array, at))));
-        Some(Arc::new(ModelPatch { layout, values: values.into(), globals, welded: None }))
+        Some(Arc::new(ModelPatch { layout: Arc::new(layout), values: values.into(), globals, welded: None }))
     }
 
     fn is_nominal(&self, model: &Model, globals: Globals) -> bool {
         self.spans.is_empty() && globals.bits() == Globals::of(model.compiled()).bits()
+    }
+}
+
+/// True if `differing` words are so many of `all` words of a list of places that a patch may have the list.
+fn are_most(differing: usize, all: usize) -> bool {
+    8 * all <= 9 * differing
+}
+
+/// Values of a patch with a given list of places, collected array by array.
+#[derive(Debug)]
+pub(super) struct PatchValues<'l> {
+    layout: &'l Arc<PatchLayout>,
+    /// Spans of arrays that are not collected yet.
+    spans: &'l [Span],
+    values: Vec<u64>,
+    /// Number of values that differ from those of the compiled model.
+    differing: usize,
+}
+
+impl<'l> PatchValues<'l> {
+    pub(super) fn new(layout: &'l Arc<PatchLayout>) -> Self {
+        let values = Vec::with_capacity(word_count(&layout.spans));
+        Self { layout, spans: &layout.spans, values, differing: 0 }
+    }
+
+    /// Adds the next array: its content, and that of the compiled model. `None` if they differ in a word outside of the
+    /// places, or in no word although the array has places.
+    pub(super) fn push(&mut self, field: &Field, mine: &[u8], compiled: &[u8]) -> Option<()> {
+        let (differing, mut end) = (self.differing, 0);
+        while let Some((span, rest)) = self.spans.split_first().filter(|(span, _)| span.field == field.index) {
+            let places = span.at as usize..(span.at + span.words) as usize;
+            if mine[end..8 * places.start] != compiled[end..8 * places.start] {
+                return None;
+            }
+            // The last word may have fewer bytes.
+            end = mine.len().min(8 * places.end);
+            for at in places {
+                let value = word(mine, at);
+                self.differing += usize::from(value != word(compiled, at));
+                self.values.push(value);
+            }
+            self.spans = rest;
+        }
+        let is_used = end == 0 || self.differing > differing;
+        (is_used && mine[end..] == compiled[end..]).then_some(())
+    }
+
+    /// The patch, after all arrays; `None` if too few of its values differ.
+    pub(super) fn into_patch(self, globals: Globals) -> Option<Arc<ModelPatch>> {
+        let Self { layout, values, differing, .. } = self;
+        let is_similar = differing > 0 && are_most(differing, values.len());
+        is_similar
+            .then(|| Arc::new(ModelPatch { layout: Arc::clone(layout), values: values.into(), globals, welded: None }))
     }
 }
 
@@ -565,6 +615,9 @@ mod tests {
             assert!(content(&model) == whole, "turn {turn}, kind {kind}");
             assert!(content(&editor.model(&base)) == whole, "turn {turn}, kind {kind}");
             assert_eq!(patch.is_none(), kind == 0, "kind {kind}");
+            // Without a model that has the patch.
+            assert_eq!(NumberArray::BODY_MASS.all(&base, patch.as_deref()), model.body_mass());
+            assert_eq!(NumberArray::GEOM_FRICTION.some::<5>(&base, patch.as_deref(), 2), model.geom_friction()[2..7]);
             differed += usize::from(whole != content(&base));
             // With a weld, and without it again.
             let weld = Weld { equality: 0, pose: [0.1, 0.2, 0.3, 0.8, 0.0, 0.6, 0.0] };
