@@ -79,7 +79,7 @@ impl SimEnv {
                     }
                 }
                 StepOutcome::Diverged(reason) => {
-                    self.row.cold.warnings.add(&raised);
+                    self.count_warnings(&raised);
                     return self.undo_step(reason);
                 }
             }
@@ -183,7 +183,7 @@ impl SimEnv {
                 raised.add(&self.data.take_warnings());
             }
         }
-        self.row.cold.warnings.add(&raised);
+        self.count_warnings(&raised);
         if bad {
             let reason = match (done, raised.diverged()) {
                 (_, Some(warning)) => Divergence::Warning(warning),
@@ -251,7 +251,7 @@ impl SimEnv {
             let reason = match classify_step(done, &raised) {
                 StepOutcome::Succeeded => {
                     if !self.row.is_forward_counted {
-                        self.row.cold.warnings.add(&raised);
+                        self.count_warnings(&raised);
                         self.row.is_forward_counted = true;
                     }
                     return;
@@ -267,7 +267,7 @@ impl SimEnv {
                     }
                 }
                 StepOutcome::Diverged(reason) => {
-                    self.row.cold.warnings.add(&raised);
+                    self.count_warnings(&raised);
                     reason
                 }
             };
@@ -356,6 +356,13 @@ impl SimEnv {
         let bytes = self.data.bytes();
         tracing::info!(target: "kinetoscope_sim", env = self.row.cold.env, ?what, bytes, "a buffer of MuJoCo was doubled");
         Ok(())
+    }
+
+    /// Adds warnings to those of the environment. Without any, the cold part of the row stays out of the cache.
+    fn count_warnings(&mut self, raised: &WarningCounts) {
+        if *raised != WarningCounts::default() {
+            self.row.cold.warnings.add(raised);
+        }
     }
 
     /// Emits an event for each of MuJoCo's warnings in `raised` that the environment has for the first time.
