@@ -35,7 +35,7 @@ pub struct SimulationManagerCfg {
     /// Seed of random numbers. The physics uses no random numbers. Sensor noise and randomized properties use random
     /// streams keyed by this seed, the global index of the environment, and their purpose.
     pub seed: u64,
-    /// Number of threads for stepping, rendering and ray casting; every core for `None`.
+    /// Number of threads; every core for `None`. All render and cast rays; at most one per environment steps.
     pub threads: Option<usize>,
     /// Distance between neighboring environments in the overview \[m\]. Physics does not depend on it.
     pub arena_space: f64,

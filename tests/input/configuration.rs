@@ -90,6 +90,15 @@ fn extreme_numbers() {
     }
 }
 
+/// More threads than environments are accepted, because they render; environments limit those that step.
+#[test]
+fn threads() {
+    for (threads, num_envs, stepping) in [(64, 3, 3), (1024, 1, 1), (2, 3, 2)] {
+        let sim = SimulationManager::new(SimulationManagerCfg { threads: Some(threads), ..cfg(num_envs) }).unwrap();
+        assert_eq!(sim.threads(), stepping, "{threads} threads for {num_envs} environments");
+    }
+}
+
 #[test]
 fn integrators() {
     let dir = tempfile::tempdir().unwrap();

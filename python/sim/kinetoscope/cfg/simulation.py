@@ -173,7 +173,7 @@ class SimulationManagerCfg:
     """
 
     threads: int | None = None
-    """Number of threads for stepping, rendering and ray casting; every core for ``None``."""
+    """Number of threads; every core for ``None``. All render and cast rays; at most one per environment steps."""
 
     arena_space: float = 5.0
     """Distance between neighboring environments in the overview [m]. Physics does not depend on it."""
