@@ -7,6 +7,7 @@ use kinetoscope::ndarray::array;
 use kinetoscope::prelude::*;
 use kinetoscope::sim::drive::table::DriveTable;
 use kinetoscope::sim::env::{EnvStatus, SimEnv};
+use kinetoscope_testkit::error_tables::assert_error;
 use kinetoscope_testkit::process::{command, is_child, run, text};
 use kinetoscope_testkit::urdf::{TempFiles, joint, link, robot};
 use kinetoscope_testkit::worlds::{arm_and_hand, text_robot};
@@ -165,6 +166,9 @@ fn scenario_limited_memory() {
     if !is_child() {
         return;
     }
+    // Not even the states of an empty scene fit.
+    let refused = SimulationManager::new(cfg(10_000_000, 1));
+    assert_error(refused, "Batch(OutOfMemory { num_envs: 10000000,", &["10000000 environments need", "use fewer"]);
     const ENVS: usize = 300_000;
     let mut sim = sim(cfg(ENVS, 1));
     let chain: String = (0..60)

@@ -3,6 +3,7 @@
 mod listings;
 mod observers;
 mod randomize;
+mod refused;
 mod rollout;
 mod shard;
 mod sizes;

@@ -6,7 +6,6 @@ use kinetoscope::mujoco::{BUILD_VERSION, Model, ObjectKind, SupportedVersion};
 use kinetoscope::ndarray::{Array2, Array3, array, s};
 use kinetoscope::prelude::*;
 use kinetoscope::sim::{DriveType, Error, FrictionCone, RandomizationError};
-use kinetoscope_testkit::error_tables::assert_error;
 use kinetoscope_testkit::urdf;
 use kinetoscope_testkit::urdf::TempFiles;
 use kinetoscope_testkit::worlds::{gains, passive, text_robot};
@@ -513,74 +512,6 @@ fn snapshots_and_rollouts() {
     // Control: nominal properties give other states.
     fresh.properties_mut().reset(ALL).unwrap();
     assert!(fresh.rollout(&controls, Some(&snapshot), ALL).unwrap().states != rollout.states);
-}
-
-#[test]
-fn mistakes() {
-    let (mut sim, _) = world(cfg(2, 1));
-    let before = all_bits(&sim);
-    for (property, name, draw, expected) in [
-        (Property::Mass, "cube", RandomizationOp::Add([-2.0, -1.0]), "kg"),
-        (Property::Mass, "cube", RandomizationOp::Set([5e-16, 5e-16]), "at least 1e-15 kg"),
-        // Such a mass is allowed, but not the moments that scale with it here.
-        (Property::Mass, "cube", RandomizationOp::Set([2e-15, 2e-15]), "moments of inertia must be positive"),
-        (Property::Inertia, "cube", RandomizationOp::Add([-1.0, -1.0]), "positive"),
-        (Property::Friction, "ground", RandomizationOp::Set([-0.1, -0.1]), ">= 0"),
-        (Property::JointDamping, "machine/hinge", RandomizationOp::Set([-1.0, -1.0]), ">= 0"),
-        (Property::Armature, "arm/JOINT1", RandomizationOp::Set([-1.0, -1.0]), ">= 0"),
-        (Property::MaxEffort, "arm/JOINT1", RandomizationOp::Set([-1.0, -1.0]), ">= 0"),
-    ] {
-        let done = sim.properties_mut().randomize(&Randomization::new().with(property, name, draw), ALL);
-        let Err(Error::Randomization(fault)) = done else { panic!("{property:?}: {done:?}") };
-        assert!(matches!(&fault, RandomizationError::Value { env: 0, name: of, .. } if of == name), "{fault}");
-        assert!(fault.to_string().contains(expected), "{fault}");
-    }
-    let mass = |pattern: &str, draw| Randomization::new().with(Property::Mass, pattern, draw);
-    let [range, reach] = [RandomizationOp::Scale([1.0, 1.0]), RandomizationOp::Add([0.0, 1.0])];
-    assert_error(sim.properties_mut().randomize(&mass("cub", range), ALL), "Randomization(Pattern", &["\"cube\""]);
-    assert_error(
-        sim.properties_mut().randomize(&mass("cube", range).with(Property::Mass, "c.*", reach), ALL),
-        "Randomization",
-        &["both"],
-    );
-    for range in [[1.0, 0.5], [f64::NAN, 1.0], [0.0, f64::INFINITY]] {
-        assert_error(
-            sim.properties_mut().randomize(&mass("cube", RandomizationOp::Set(range)), ALL),
-            "Randomization(Range",
-            &[],
-        );
-    }
-    // Joints whose implicit drive uses the friction row, and the free joint of an object, do not have this property.
-    let none =
-        Randomization::new().with(Property::DryFriction, "arm/JOINT1|cube/free", RandomizationOp::Set([1.0, 1.0]));
-    assert_error(sim.properties_mut().randomize(&none, ALL), "Randomization(Pattern { property: \"dry_friction\"", &[]);
-    type Set = (Property, &'static str, &'static [f64]);
-    let mut set = |(property, name, values): Set| {
-        sim.properties_mut().randomize_with(ALL, |_, _, p| p.set(property, name, values))
-    };
-    assert_error(set((Property::Inertia, "cube", &[1.0, 1.0, 2.1])), "Randomization", &["sum of the others"]);
-    let width = set((Property::Gravity, "gravity", &[0.0]));
-    assert!(matches!(width, Err(Error::Randomization(RandomizationError::Width { expected: 3, found: 1, .. }))));
-    let name = set((Property::Mass, "kube", &[0.0]));
-    assert!(matches!(name, Err(Error::UnknownName { candidates, .. }) if candidates[0] == "cube"));
-    assert!(matches!(sim.properties().of(EnvId(2)), Err(Error::UnknownIndex { .. })));
-    assert!(matches!(
-        sim.properties_mut().randomize(&Randomization::new(), Some(&[EnvId(7)])),
-        Err(Error::UnknownIndex { .. })
-    ));
-    // The first environment was valid, the second not: neither changes.
-    let half = sim
-        .properties_mut()
-        .randomize_with(ALL, |_, env, p| p.set(Property::Mass, "cube", &[1.0 - 2.0 * env.0 as f64]));
-    assert!(matches!(half, Err(Error::Randomization(RandomizationError::Value { env: 1, .. }))));
-    assert_eq!(get(&sim, 0, Property::Mass, "cube"), [0.5]);
-    assert_eq!(all_bits(&sim), before);
-    // Failed calls do not advance the random streams.
-    let (mut other, _) = world(cfg(2, 1));
-    for sim in [&mut sim, &mut other] {
-        sim.properties_mut().randomize(&all_properties(), ALL).unwrap();
-    }
-    assert_eq!(values(&sim, 1), values(&other, 1));
 }
 
 /// 4.x keeps only the diagonal of the inertia matrix of a free body whose center of mass is at its origin, unless the
