@@ -617,8 +617,7 @@ mod tests {
             assert_eq!(patch.is_none(), kind == 0, "kind {kind}");
             // Without a model that has the patch.
             assert_eq!(NumberArray::BODY_MASS.all(&base, patch.as_deref()), model.body_mass());
-            let some: [f64; 5] = NumberArray::GEOM_FRICTION.some(&base, patch.as_deref(), 2);
-            assert_eq!(some, model.geom_friction()[2..7]);
+            assert_eq!(NumberArray::GEOM_FRICTION.some::<5>(&base, patch.as_deref(), 2), model.geom_friction()[2..7]);
             differed += usize::from(whole != content(&base));
             // With a weld, and without it again.
             let weld = Weld { equality: 0, pose: [0.1, 0.2, 0.3, 0.8, 0.0, 0.6, 0.0] };
