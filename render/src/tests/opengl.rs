@@ -465,8 +465,6 @@ fn texels_of_shadow_maps() {
         };
         let image = draw(0);
         assert_eq!(image.color(), draw(side).color(), "{size} {side}");
-        for other in [side / 2, 2 * side] {
-            assert_ne!(image.color(), draw(other).color(), "the control: {size} {other}");
-        }
+        assert_ne!(image.color(), draw(side / 8).color(), "the control: {size} {side}");
     }
 }
