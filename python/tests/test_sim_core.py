@@ -109,7 +109,7 @@ def test_forms_of_patterns(arm_sim):
     _, arm = arm_sim
     for patterns in ("JOINT[23]", ["JOINT[23]"], ("JOINT2", "JOINT3"), ["JOINT2", "JOINT3"]):
         assert arm.find_joints(patterns) == [1, 2]
-    assert arm.find_links("LINK1") == [arm.link_names.index("LINK1")]
+    assert arm.find_links("link1") == [arm.link_names.index("link1")]
 
 
 @pytest.mark.parametrize(
@@ -126,7 +126,7 @@ def test_forms_of_patterns(arm_sim):
         (lambda s, a: a.set_qpos_target([0], joint_ids=["JOINT9"]), ks.UnknownNameError, "JOINT1"),
         (lambda s, a: a.set_qpos_target([0, 0], joint_ids=["JOINT1", 2]), ks.ArgumentError, "joint_ids: 2 is not a text"),
         (lambda s, a: a.find_joints(3), ks.ArgumentError, "patterns"),
-        (lambda s, a: a.find_links(["LINK1", None]), ks.ArgumentError, "patterns: None"),
+        (lambda s, a: a.find_links(["link1", None]), ks.ArgumentError, "patterns: None"),
         (lambda s, a: a.joint_ids("amr"), ks.UnknownNameError, "arm"),
         (lambda s, a: a.link_pose("nothing"), ks.UnknownNameError, "nothing"),
         (lambda s, a: s.add_robot(ks.bundled_robot("sr5", uid="arm")), ks.ConfigError, "taken"),
