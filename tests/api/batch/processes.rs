@@ -166,9 +166,9 @@ fn scenario_limited_memory() {
     if !is_child() {
         return;
     }
-    // Not even the states of an empty scene fit.
+    // Above the limit of a process, whatever its memory.
     let refused = SimulationManager::new(cfg(10_000_000, 1));
-    assert_error(refused, "Batch(OutOfMemory { num_envs: 10000000,", &["10000000 environments need", "use fewer"]);
+    assert_error(refused, "Config { field: \"num_envs\"", &["10000000", "at most 1048576 environments"]);
     const ENVS: usize = 300_000;
     let mut sim = sim(cfg(ENVS, 1));
     let chain: String = (0..60)

@@ -30,12 +30,15 @@ fn is_readable(text: &str) -> bool {
 fn scenes() -> Vec<String> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let read = |path: &Path| std::fs::read_to_string(path).unwrap();
-    let mut texts: Vec<String> = files_below(&root.join("assets"), "toml").iter().map(|path| read(path)).collect();
+    // Other files of this kind are tasks.
+    let is_scene = |text: &String| text.contains("[entities.");
+    let mut texts: Vec<String> =
+        files_below(&root.join("assets"), "toml").iter().map(|path| read(path)).filter(is_scene).collect();
     texts.extend([TEXT.into(), terrain::FILE.into(), every_kind().to_toml(&EntityTypes::default()).unwrap()]);
     for page in files_below(&root.join("docs"), "md") {
         let page = read(&page);
         let blocks = page.split("```toml\n").skip(1).filter_map(|rest| rest.split_once("```"));
-        texts.extend(blocks.map(|(block, _)| block.to_owned()).filter(|block| block.contains("[entities.")));
+        texts.extend(blocks.map(|(block, _)| block.to_owned()).filter(is_scene));
     }
     texts
 }
