@@ -50,7 +50,7 @@ def blocks_of_the_page():
 
 
 def test_programs_of_the_page(tmp_path, monkeypatch, capsys):
-    """The programs but those of tasks, with fewer environments, smaller images and no window."""
+    """The programs but those of tasks and Gymnasium, with fewer environments, smaller images and no window."""
     monkeypatch.chdir(tmp_path)
     changes = {
         "num_envs=64": "num_envs=2",
@@ -58,7 +58,7 @@ def test_programs_of_the_page(tmp_path, monkeypatch, capsys):
         "sim.open_window()": "None",
         "sim.stream_to_foxglove()": 'sim.stream_to_foxglove("127.0.0.1:0")',
     }
-    blocks = [block for block in blocks_of_the_page() if "ks.Task(" not in block]
+    blocks = [block for block in blocks_of_the_page() if "ks.Task(" not in block and "gymnasium" not in block]
     for old, new in changes.items():
         assert any(old in block for block in blocks), old
         blocks = [block.replace(old, new) for block in blocks]

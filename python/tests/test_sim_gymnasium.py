@@ -41,7 +41,11 @@ def cart_task(num_envs, autoreset, dtype="float32", **changes):
 def assert_same(found, expected):
     """Equal in bits, recursively, for observations and infos."""
     assert type(found) is type(expected), (found, expected)
-    if isinstance(expected, dict):
+    if isinstance(expected, tuple):
+        assert len(found) == len(expected)
+        for one, other in zip(found, expected):
+            assert_same(one, other)
+    elif isinstance(expected, dict):
         assert found.keys() == expected.keys()
         for key in expected:
             assert_same(found[key], expected[key])
@@ -176,7 +180,7 @@ def test_refusals():
         (lambda: envs.reset(options={"reset_mask": np.ones(3, bool)}), ["(3,)", "(2,)"]),
         (lambda: envs.reset(options={"reset_mask": np.ones(2)}), ["float64", "booleans"]),
         (lambda: envs.reset(seed=[1, 2]), ["[1, 2]", "one number"]),
-        (lambda: envs.step(np.zeros((2, 3))), ["(2, 3)", "(2, 1)"]),
+        (lambda: envs.step(np.zeros((2, 3))), ["[2, 3]", "[2, 1]"]),
         (lambda: envs.step(np.full((2, 1), np.nan)), ["NaN"]),
         (lambda: ks.VectorEnv(cart_task(1, "disabled"), render_mode="human"), ["human", "rgb_array"]),
         (lambda: Env(cart_task(2, "disabled")), ["2 environments", "VectorEnv"]),

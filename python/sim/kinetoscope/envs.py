@@ -13,7 +13,7 @@ import difflib
 import tomllib
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import gymnasium
 
@@ -35,7 +35,7 @@ def load(
     num_envs: int = 1,
     *,
     autoreset: str | None = None,
-    dtype: str = "float32",
+    dtype: Literal["float32", "float64"] = "float32",
     simulation: dict[str, Any] | None = None,
 ) -> Task:
     """The ready-made task ``name``, such as ``"balance"``, in a new simulation.

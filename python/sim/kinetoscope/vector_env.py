@@ -60,7 +60,7 @@ class VectorEnv(gymnasium.vector.VectorEnv[Any, Any, _Array]):
         self._is_dict = len(self._images) > 1 or any(self._images.values())
         self.single_observation_space = self._space()
         _, low, high = task.action_space
-        self.single_action_space = spaces.Box(np.float32(low), np.float32(high), dtype=np.float32)
+        self.single_action_space = spaces.Box(np.asarray(low, np.float32), np.asarray(high, np.float32), dtype=np.float32)
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
 
