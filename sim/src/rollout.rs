@@ -163,7 +163,7 @@ impl SimulationManager {
             Ok(())
         };
         std::thread::scope(|scope| -> Result<()> {
-            // Where the system refuses a thread, fewer do the same work.
+            // If the system refuses a thread, fewer threads do the same work.
             let start = |_| std::thread::Builder::new().spawn_scoped(scope, run).ok();
             let others: Vec<_> = (1..threads).map_while(start).collect();
             let mine = run();
