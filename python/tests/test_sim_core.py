@@ -378,25 +378,40 @@ def test_text_of_a_simulation_in_use(arm_sim):
     assert "2 envs" in repr(sim) and "6 joints" in repr(arm)
 
 
-def test_created_and_destroyed_simulations_leave_no_memory():
-    def once():
-        with ks.SimulationManager(num_envs=2, threads=2) as sim:
-            sim.add_rigid_object(uid="cube", init_pose={"pos": [0, 0, 1]})
-            cam = sim.add_sensor("camera", ks.CameraCfg(width=16, height=16))
-            sim.update(3)
-            assert cam["color"].any()
+def camera_once(_folder):
+    with ks.SimulationManager(num_envs=2, threads=2) as sim:
+        sim.add_rigid_object(uid="cube", init_pose={"pos": [0, 0, 1]})
+        cam = sim.add_sensor("camera", ks.CameraCfg(width=16, height=16))
+        sim.update(3)
+        assert cam["color"].any()
 
+
+def robot_once(folder):
+    """A robot with meshes, a recording of it, and a snapshot that another simulation takes over."""
+    with ks.SimulationManager(num_envs=2, threads=2) as sim:
+        arm = sim.add_robot(ks.RobotCfg(uid="arm", urdf=ks.asset("sr5/SR5.urdf")))
+        with sim.record(folder / "run.npz", overwrite=True):
+            sim.update(3)
+        sim.restore(sim.snapshot())
+        assert np.isfinite(arm.qpos).all()
+
+
+@pytest.mark.parametrize(
+    ("once", "times", "leaked_bytes"),
+    # One state or image of a simulation is about 20 kB, the meshes of the robot are about 1 MB.
+    [(camera_once, 500, 20_000), (robot_once, 100, 100_000)],
+)
+def test_created_and_destroyed_simulations_leave_no_memory(once, times, leaked_bytes, tmp_path):
     for _ in range(40):
-        once()
+        once(tmp_path)
     gc.collect()
     before = resident()
-    for _ in range(500):
-        once()
+    for _ in range(times):
+        once(tmp_path)
     gc.collect()
-    # A leak of one state or image of a simulation, about 20 kB, would be 10 MB.
     assert resident() - before < 2e6
     # A control: this is such a leak.
-    leaked = [bytearray(b"x" * 20_000) for _ in range(500)]
+    leaked = [bytearray(b"x" * leaked_bytes) for _ in range(times)]
     assert resident() - before > 2e6 and leaked
 
 
