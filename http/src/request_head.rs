@@ -35,11 +35,13 @@ impl RequestHead {
         let start = Instant::now();
         let mut bytes = Vec::new();
         let mut chunk = [0; 2048];
+        let mut parsed_length = 0;
         loop {
             let left = Self::READ_TIMEOUT.saturating_sub(start.elapsed());
             if left.is_zero() || stream.set_read_timeout(Some(left)).is_err() {
                 return Err(Status::Timeout);
             }
+            let before = bytes.len();
             match stream.read(&mut chunk) {
                 Ok(0) if bytes.is_empty() => return Ok(None),
                 Ok(0) => return Err(Status::BadRequest),
@@ -50,6 +52,13 @@ impl RequestHead {
                 }
                 Err(_) => return Ok(None),
             }
+            // A client that sends single bytes does not cause a parse for each of them. A head ends with an empty line.
+            let new = &bytes[before.saturating_sub(2)..];
+            let has_empty_line = [&b"\n\n"[..], b"\n\r\n"].iter().any(|end| new.windows(end.len()).any(|w| w == *end));
+            if bytes.len() < 2 * parsed_length && !has_empty_line {
+                continue;
+            }
+            parsed_length = bytes.len();
             if let Some(head) = Self::parse(&bytes)? {
                 return Ok(Some(head));
             }
@@ -115,9 +124,32 @@ impl RequestHead {
 #[allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
 mod tests {
     use super::*;
+    use std::io::Write;
+    use std::net::TcpListener;
 
     fn parsed(text: &str) -> Result<Option<RequestHead>, Status> {
         RequestHead::parse(text.as_bytes())
+    }
+
+    /// A client may send single bytes. The bytes after the head are kept.
+    #[test]
+    fn single_bytes() {
+        for end in ["\r\n\r\n", "\n\n", "\r\n\n"] {
+            let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+            let mut client = TcpStream::connect(listener.local_addr().unwrap()).unwrap();
+            let (mut server, _) = listener.accept().unwrap();
+            let text = format!("GET /page HTTP/1.1\r\nHost: localhost{end}");
+            let sent = std::thread::spawn(move || {
+                for byte in text.bytes() {
+                    client.write_all(&[byte]).unwrap();
+                    std::thread::sleep(Duration::from_micros(200));
+                }
+                client
+            });
+            let head = RequestHead::read(&mut server).unwrap().unwrap();
+            assert_eq!((head.path.as_str(), head.header("host")), ("/page", Ok(Some("localhost"))));
+            sent.join().unwrap();
+        }
     }
 
     #[test]

@@ -1,5 +1,6 @@
 //! MJCF names that an old MuJoCo rejects: the version that introduced them, and their position in a file.
 
+use kinetoscope_scene::input_file;
 use kinetoscope_scene::source_location::SourceLocation;
 use std::path::{Path, PathBuf};
 
@@ -126,7 +127,7 @@ impl<'m> UnknownKeyword<'m> {
             return None;
         }
         seen.push(file.to_path_buf());
-        let text = std::fs::read_to_string(file).ok()?;
+        let text = input_file::read_referenced_text(file).ok()?;
         let document = roxmltree::Document::parse(&text).ok()?;
         for node in document.descendants().filter(roxmltree::Node::is_element) {
             let has_word = || match self.keyword {

@@ -11,7 +11,8 @@
 //! | [`KeyedRng`], [`Philox`], [`sampling`] | random numbers and sample warping |
 //! | [`Ray`], [`camera_fit`] | rays, and camera placement around a scene |
 //! | [`npy`] | NumPy array files |
-//! | [`file_format`], [`yaml`], [`pattern`], [`source_location`], [`AtomicFile`] | configuration files, name patterns, files |
+//! | [`file_format`], [`yaml`], [`pattern`], [`source_location`] | configuration files and name patterns |
+//! | [`input_file`], [`AtomicFile`] | reading of files with a bound, complete writing of files |
 //!
 //! ```
 //! use kinetoscope_scene::shape::Sphere;
@@ -28,6 +29,7 @@ mod atomic_file;
 pub mod basis;
 pub mod camera_fit;
 pub mod file_format;
+pub mod input_file;
 mod light;
 mod marker;
 mod material;

@@ -6,8 +6,11 @@ use std::sync::Arc;
 
 /// Largest depth of nested lists and tables.
 const MAX_DEPTH: usize = 48;
-/// Largest size with all aliases expanded \[bytes\]: aliases of aliases grow exponentially.
-const MAX_EXPANDED_BYTES: usize = 64 << 20;
+/// Largest size with all aliases expanded \[bytes\], whatever the size of the file. Aliases of aliases grow
+/// exponentially, and every value takes about 100 bytes.
+const MIN_EXPANSION_LIMIT: usize = 1 << 20;
+/// Larger files may grow to this multiple of their size.
+const MAX_EXPANSION: usize = 64;
 
 /// Features that a kind of YAML file may use.
 #[derive(Clone, Copy, Debug)]
@@ -113,9 +116,11 @@ enum Content {
 ///
 /// # Errors
 /// The text is not YAML, has several documents or duplicate keys, uses aliases or tags that `dialect` rejects, or
-/// exceeds this parser's limits of depth (48) and size (64 MiB with all aliases expanded).
+/// exceeds this parser's limits of depth (48) and size (with all aliases expanded, 64 times the text or 1 MiB, whichever is
+/// larger).
 pub fn parse(text: &str, dialect: &YamlFeatures) -> Result<Option<Node>, YamlError> {
-    let mut builder = Builder { dialect, open: Vec::new(), root: None, anchors: HashMap::new(), size: 0 };
+    let max_size = MIN_EXPANSION_LIMIT.max(MAX_EXPANSION.saturating_mul(text.len()));
+    let mut builder = Builder { dialect, open: Vec::new(), root: None, anchors: HashMap::new(), size: 0, max_size };
     let mut parser = Parser::new_from_str(text);
     while let Some(event) = parser.next_event() {
         let (event, span) = event.map_err(|e| {
@@ -137,6 +142,7 @@ struct Builder<'a> {
     anchors: HashMap<usize, (Value, usize)>,
     /// Approximate size of the file with all aliases expanded \[bytes\].
     size: usize,
+    max_size: usize,
 }
 
 impl Builder<'_> {
@@ -206,13 +212,14 @@ impl Builder<'_> {
         Ok(())
     }
 
-    /// Counts a value of `bytes` bytes, and returns the size before it; an error above [`MAX_EXPANDED_BYTES`] in total.
+    /// Counts a value of `bytes` bytes, and returns the size before it; an error above the limit in total.
     fn count_bytes(&mut self, bytes: usize) -> Result<usize, String> {
         let begin = self.size;
         // Two more for brackets, commas and colons.
         self.size += bytes + 2;
-        if self.size > MAX_EXPANDED_BYTES {
-            return Err("with all its aliases the file is larger than 64 MiB".into());
+        if self.size > self.max_size {
+            let most = self.max_size;
+            return Err(format!("with all its aliases the file is larger than {most} bytes; expected fewer aliases"));
         }
         Ok(begin)
     }
@@ -350,7 +357,7 @@ mod tests {
             ("a: *b\n", 1, ""),
             ("a: &b [*b]\n", 1, "inside its own anchor"),
             (&deep, 1, "nest deeper"),
-            (&bomb, 8, "64 MiB"),
+            (&bomb, 6, "larger than 1048576 bytes"),
         ] {
             let error = parse(yaml, &ALL).unwrap_err();
             assert!(error.message.contains(needle), "{yaml}: {error:?}");

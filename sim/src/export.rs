@@ -321,15 +321,7 @@ fn export_material(
 /// Error messages for the unreadable textures of a mesh.
 fn unreadable_textures(mesh: &TriMesh) -> Vec<String> {
     let sources = mesh.materials.iter().filter_map(|m| m.texture.as_ref());
-    sources
-        .filter_map(|source| match source {
-            TextureSource::File(path) => match std::fs::read(path) {
-                Ok(bytes) => image::load_from_memory(&bytes).err().map(|e| format!("{}: {e}", path.display())),
-                Err(error) => Some(format!("{}: {error}", path.display())),
-            },
-            TextureSource::Embedded(bytes) => image::load_from_memory(bytes).err().map(|e| e.to_string()),
-        })
-        .collect()
+    sources.filter_map(|source| source.decode().err()).collect()
 }
 
 /// Writes a texture as PNG, the only image format that MuJoCo reads. Returns the name of the texture asset; `None` if
@@ -341,23 +333,17 @@ fn export_texture(
     textures: &mut BTreeMap<TextureKey, String>,
     dir: &Path,
 ) -> Result<Option<String>> {
-    let bytes = match source {
-        TextureSource::File(path) => match std::fs::read(path) {
-            Ok(bytes) => bytes,
-            Err(_) => return Ok(None),
-        },
-        TextureSource::Embedded(bytes) => bytes.clone(),
-    };
-    if let Some(known) = textures.get(&bytes) {
+    let Ok(bytes) = source.bytes() else { return Ok(None) };
+    if let Some(known) = textures.get(&*bytes) {
         return Ok(Some(known.clone()));
     }
-    let Ok(image) = image::load_from_memory(&bytes) else { return Ok(None) };
+    let Ok(image) = source.decode() else { return Ok(None) };
     let texture = format!("{name}_texture");
     let file = format!("meshes/{texture}.png");
     let path = dir.join(&file);
-    image.to_rgb8().save(&path).map_err(|e| Error::Image { path, reason: e.to_string() })?;
+    image.save(&path).map_err(|e| Error::Image { path, reason: e.to_string() })?;
     mjcf.textures.push(TextureAsset { name: texture.clone(), file });
-    textures.insert(bytes, texture.clone());
+    textures.insert(bytes.into_owned(), texture.clone());
     Ok(Some(texture))
 }
 

@@ -7,6 +7,7 @@ use std::any::{Any, TypeId};
 use std::fmt;
 use std::hash::{Hash, Hasher};
 use std::marker::PhantomData;
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 
 /// Observes a simulation between its steps and may change it: a viewer, a recorder, a pause control.
 ///
@@ -18,7 +19,8 @@ pub trait Observer: Any + Send {
     /// before every block of steps.
     fn due_in(&self, sim: &SimulationManager) -> u64;
 
-    /// Handles an event. Changes made here, including steps, are reported to the other observers but not to this one.
+    /// Handles an event. Changes made here, including steps, are reported to the other observers but not to this one. A
+    /// panic ends the call that caused the event, after the other observers were notified; the observer stays.
     fn on_event(&mut self, sim: &mut SimulationManager, event: &SimEvent);
 
     /// Handles an event that another crate publishes ([`ObserversMut::publish`](crate::ObserversMut::publish)), such as
@@ -268,9 +270,8 @@ impl SimulationManager {
         let block = u32::try_from(first).unwrap_or(u32::MAX).min(steps);
         step(self, block);
         self.observers.steps += u64::from(block);
-        for (number, _) in waits.iter().filter(|(_, wait)| *wait <= u64::from(block)) {
-            self.notify(*number, |observer, sim| observer.on_event(sim, &SimEvent::Stepped));
-        }
+        let due = waits.into_iter().filter(|(_, wait)| *wait <= u64::from(block)).map(|(number, _)| number);
+        self.notify_listed(due, |observer, sim| observer.on_event(sim, &SimEvent::Stepped));
         block
     }
 
@@ -288,19 +289,32 @@ impl SimulationManager {
 
     fn notify_each_with(&mut self, tell: impl Fn(&mut dyn Observer, &mut Self)) {
         let numbers: Vec<u64> = self.observers.slots.iter().map(|slot| slot.number).collect();
+        self.notify_listed(numbers, tell);
+    }
+
+    /// Notifies the observers with these numbers. An observer that panics stays in the simulation, and the others are
+    /// notified before the panic of the first one continues.
+    fn notify_listed(&mut self, numbers: impl IntoIterator<Item = u64>, tell: impl Fn(&mut dyn Observer, &mut Self)) {
+        let mut first_panic = None;
         for number in numbers {
-            self.notify(number, &tell);
+            first_panic = first_panic.or(self.notify(number, &tell).err());
+        }
+        if let Some(panic) = first_panic {
+            resume_unwind(panic);
         }
     }
 
-    fn notify(&mut self, number: u64, tell: impl FnOnce(&mut dyn Observer, &mut Self)) {
+    /// Notifies one observer. An error is its panic.
+    fn notify(&mut self, number: u64, tell: impl FnOnce(&mut dyn Observer, &mut Self)) -> std::thread::Result<()> {
         // An observer that is handling an event receives no event of its own changes.
-        let Some(slot) = self.observers.slots.iter_mut().find(|slot| slot.number == number) else { return };
-        let Some(mut observer) = slot.observer.take() else { return };
-        tell(observer.as_mut(), self);
+        let Some(slot) = self.observers.slots.iter_mut().find(|slot| slot.number == number) else { return Ok(()) };
+        let Some(mut observer) = slot.observer.take() else { return Ok(()) };
+        // The observer's methods are the only code that runs here, and each of them leaves the simulation whole.
+        let told = catch_unwind(AssertUnwindSafe(|| tell(observer.as_mut(), self)));
         // An observer that was removed meanwhile is dropped here.
         if let Some(slot) = self.observers.slots.iter_mut().find(|slot| slot.number == number) {
             slot.observer = Some(observer);
         }
+        told
     }
 }

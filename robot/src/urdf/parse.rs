@@ -13,15 +13,12 @@ use super::reader::{Reader, format_element, write_attribute};
 use super::tree::{JointEdge, NamedElement, Tree};
 use super::xml::{repair, trim_nuls};
 use crate::diagnostic::DiagnosticKind;
+use kinetoscope_scene::input_file::{self, MAX_TEXT};
 use kinetoscope_scene::source_location::SourceLocation;
 use roxmltree::{Document, Node};
 use std::collections::HashSet;
-use std::io::Read;
 use std::path::Path;
 use std::sync::Arc;
-
-/// Size limit of a file \[bytes\]. A URDF holds no meshes; a larger file is a wrong file or an endless device.
-const MAX_FILE_SIZE: u64 = 256 << 20;
 
 /// Top-level elements without meaning for the simulation, common enough to be skipped without a warning.
 const IGNORED_ELEMENTS: [&str; 8] =
@@ -46,16 +43,11 @@ pub fn parse_file_with(path: impl AsRef<Path>, strictness: Strictness) -> Result
     if path.is_dir() {
         return Err(UrdfError::FileIsFolder { path: owned(), urdfs: urdfs_in(path) });
     }
-    let file = std::fs::File::open(path).map_err(|source| match source.kind() {
+    let bytes = input_file::read_named(path, MAX_TEXT).map_err(|source| match source.kind() {
         std::io::ErrorKind::NotFound => UrdfError::FileMissing { path: owned() },
+        std::io::ErrorKind::FileTooLarge => UrdfError::FileTooLarge { path: owned(), limit: MAX_TEXT },
         _ => UrdfError::FileUnreadable { path: owned(), source },
     })?;
-    let mut bytes = Vec::new();
-    let read = file.take(MAX_FILE_SIZE + 1).read_to_end(&mut bytes);
-    read.map_err(|source| UrdfError::FileUnreadable { path: owned(), source })?;
-    if bytes.len() as u64 > MAX_FILE_SIZE {
-        return Err(UrdfError::FileTooLarge { path: owned(), limit: MAX_FILE_SIZE });
-    }
     match std::str::from_utf8(&bytes) {
         Ok(text) => parse_str_with(text, path, strictness),
         Err(error) => Err(encoding(&bytes, error.valid_up_to(), path)),

@@ -3,19 +3,18 @@
 use super::error::UrdfError;
 use crate::diagnostic::{Diagnostic, DiagnosticKind};
 use crate::urdf::config::Strictness;
-use kinetoscope_scene::source_location::SourceLocation;
+use kinetoscope_scene::source_location::{LineStarts, SourceLocation};
 use roxmltree::Node;
 use std::cell::RefCell;
 use std::fmt::Write as _;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-/// Reader of a document with source locations. It stores the starts of lines, because the XML library scans the whole
-/// text to find a line number.
+/// Reader of a document with source locations.
 #[derive(Debug)]
 pub(super) struct Reader<'i> {
     pub(super) file: Arc<PathBuf>,
-    line_starts: Vec<usize>,
+    lines: LineStarts,
     /// Namespace of the root element. Elements of this namespace, or without a namespace, belong to URDF.
     namespace: Option<&'i str>,
     strictness: Strictness,
@@ -29,15 +28,13 @@ const COUNTS: [&str; 7] = ["no", "one", "two", "three", "four", "five", "six"];
 
 impl<'i> Reader<'i> {
     pub(super) fn new(file: Arc<PathBuf>, text: &str, namespace: Option<&'i str>, strictness: Strictness) -> Self {
-        let ends = text.bytes().enumerate().filter(|&(_, b)| b == b'\n').map(|(i, _)| i + 1);
-        let line_starts = std::iter::once(0).chain(ends).collect();
-        Self { file, line_starts, namespace, strictness, diagnostics: Vec::new(), commas: RefCell::new(None) }
+        let lines = LineStarts::new(text);
+        Self { file, lines, namespace, strictness, diagnostics: Vec::new(), commas: RefCell::new(None) }
     }
 
     /// Location of a byte of the text.
     pub(super) fn source_at(&self, position: usize) -> SourceLocation {
-        let line = self.line_starts.partition_point(|&start| start <= position);
-        SourceLocation { file: self.file.clone(), line: u32::try_from(line).unwrap_or(u32::MAX) }
+        SourceLocation { file: self.file.clone(), line: self.lines.line(position) }
     }
 
     /// Location of an element.

@@ -5,6 +5,7 @@ use std::path::Path;
 use super::error::ReadContext;
 use super::format::Format;
 use super::{MeshError, MeshOptions, TriMesh, dae, glb, obj, stl};
+use crate::input_file::{self, MAX_BINARY};
 
 /// All formats.
 const FORMATS: [&Format; 5] = [&stl::FORMAT, &obj::FORMAT, &dae::FORMAT, &glb::GLB, &glb::GLTF];
@@ -67,5 +68,5 @@ pub fn load_bytes(path: impl AsRef<Path>, bytes: &[u8], options: &MeshOptions) -
 }
 
 pub(super) fn read(path: &Path) -> Result<Vec<u8>, MeshError> {
-    std::fs::read(path).map_err(|source| MeshError::Io { path: path.to_owned(), source })
+    input_file::read_referenced(path, MAX_BINARY).map_err(|source| MeshError::Io { path: path.to_owned(), source })
 }

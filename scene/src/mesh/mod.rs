@@ -27,12 +27,12 @@ mod stl;
 mod tests_corrupt;
 #[cfg(test)]
 mod tests_robots;
+mod texture_source;
 mod trimesh;
 mod volume_integrals;
 mod write;
 
 use std::ops::Range;
-use std::path::PathBuf;
 
 pub use convex_decomposition::{ConvexDecomposition, ConvexDecompositionCfg, convex_decomposition};
 pub use error::MeshError;
@@ -42,6 +42,7 @@ pub use hull_error::HullError;
 pub use load::{load, load_bytes, load_with};
 pub use options::{DaeUpAxis, MeshOptions};
 pub use prisms::prisms;
+pub use texture_source::TextureSource;
 pub use trimesh::InvalidMesh;
 pub use volume_integrals::VolumeIntegrals;
 pub use write::{write_binary_stl, write_obj};
@@ -87,13 +88,4 @@ pub struct MeshMaterial {
     pub rgba: [f32; 4],
     /// Base color texture; `None` for a uniform color.
     pub texture: Option<TextureSource>,
-}
-
-/// Source of a texture's pixels.
-#[derive(Clone, Debug, PartialEq)]
-pub enum TextureSource {
-    /// An image file, with its path resolved relative to the mesh file. It may not exist.
-    File(PathBuf),
-    /// An image inside the mesh file (GLB, or a `data:` URI of glTF): its bytes, usually PNG or JPEG.
-    Embedded(Vec<u8>),
 }

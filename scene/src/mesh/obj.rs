@@ -4,13 +4,15 @@
 //! errors do not name the line. If only some corners have texture coordinates, it loses their places: of
 //! `"v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0.5 0.25\nf 1 2/1 3\n"`, it returns three positions and one texture coordinate.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
+use std::path::PathBuf;
 
 use super::builder::{Builder, Corner};
 use super::error::{ReadContext, beside};
 use super::format::{Format, begins_with_word};
 use super::polygon::triangulate;
 use super::{MeshError, TriMesh, mtl};
+use crate::input_file::{self, MAX_TEXT};
 
 /// The Wavefront OBJ format.
 pub(super) const FORMAT: Format = Format {
@@ -30,6 +32,8 @@ struct Reader {
     builder: Builder,
     /// Materials of all libraries read so far, by name.
     known: HashMap<String, usize>,
+    /// Files of these libraries; a file that is named again adds nothing.
+    libraries: HashSet<PathBuf>,
     material: Option<usize>,
 }
 
@@ -110,13 +114,15 @@ impl Reader {
     /// Missing files are skipped.
     fn library(&mut self, ctx: &ReadContext<'_>, names: &str) -> Result<(), MeshError> {
         // `names` is either one name with spaces or several names.
-        let whole = std::fs::read(beside(ctx.path, names)).ok().map(|bytes| vec![(names, bytes)]);
-        let files = whole.unwrap_or_else(|| {
-            let one = |name| std::fs::read(beside(ctx.path, name)).ok().map(|bytes| (name, bytes));
-            names.split_whitespace().filter_map(one).collect()
-        });
-        for (name, bytes) in files {
-            for material in mtl::read(&beside(ctx.path, name), ctx, &bytes)? {
+        let candidates =
+            if beside(ctx.path, names).is_file() { vec![names] } else { names.split_whitespace().collect() };
+        for name in candidates {
+            let path = beside(ctx.path, name);
+            if !self.libraries.insert(path.clone()) {
+                continue;
+            }
+            let Ok(bytes) = input_file::read_referenced(&path, MAX_TEXT) else { continue };
+            for material in mtl::read(&path, ctx, &bytes)? {
                 let name = material.name.clone();
                 let id = self.builder.material(material);
                 self.known.entry(name).or_insert(id);

@@ -96,30 +96,39 @@ struct Obstacle {
 
 /// Heights of a field with obstacles. A later obstacle replaces earlier ones.
 ///
-/// The last obstacle is placed first, and every point is set once: large obstacles that overlap would otherwise set
-/// all points again for each of them.
+/// Lines of points are computed one by one, along the longer axis. In each line, the last obstacle is placed first, and
+/// every point is set once: large obstacles that overlap would otherwise set all points again for each of them.
 fn place(obstacles: &[Obstacle], [rows, columns]: [usize; 2]) -> Array2<f64> {
-    let mut heights = Array2::zeros((rows, columns));
-    // For each point, and for the end of each row, a column from which on to search for the next unset point of the
-    // row; the column itself if the point is unset, or for the end.
-    let mut next_unset = Array2::from_shape_fn((rows, columns + 1), |(_, c)| c);
-    for obstacle in obstacles.iter().rev() {
-        for r in obstacle.rows.clone() {
-            let (mut heights, mut next_unset) = (heights.row_mut(r), next_unset.row_mut(r));
-            let mut c = obstacle.columns.start;
-            loop {
-                while next_unset[c] != c {
-                    // Shortens later searches: the path of a search is halved.
-                    next_unset[c] = next_unset[next_unset[c]];
-                    c = next_unset[c];
-                }
-                if c >= obstacle.columns.end {
-                    break;
-                }
-                heights[c] = obstacle.height;
-                next_unset[c] = c + 1;
+    let is_wide = columns >= rows;
+    let length = rows.max(columns);
+    let mut heights = vec![0.0; rows * columns];
+    for (line, heights) in heights.chunks_exact_mut(length).enumerate() {
+        // For each point, and for the end, a point from which on to search for the next unset one; the point itself if
+        // it is unset, or for the end.
+        let mut next_unset: Vec<usize> = (0..=length).collect();
+        for Obstacle { columns, rows, height } in obstacles.iter().rev() {
+            let (across, along) = if is_wide { (rows, columns) } else { (columns, rows) };
+            if !across.contains(&line) {
+                continue;
+            }
+            let mut point = find(&mut next_unset, along.start);
+            while point < along.end {
+                heights[point] = *height;
+                // All points up to the end of the obstacle are set in this line.
+                next_unset[point] = along.end;
+                point = find(&mut next_unset, point + 1);
             }
         }
     }
-    heights
+    let at = |r: usize, c: usize| if is_wide { heights[r * length + c] } else { heights[c * length + r] };
+    Array2::from_shape_fn((rows, columns), |(r, c)| at(r, c))
+}
+
+/// First unset point of a line from `point` on, or its end. Halves the path of the search for later ones.
+fn find(next_unset: &mut [usize], mut point: usize) -> usize {
+    while next_unset[point] != point {
+        next_unset[point] = next_unset[next_unset[point]];
+        point = next_unset[point];
+    }
+    point
 }

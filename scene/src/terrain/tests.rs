@@ -184,24 +184,26 @@ fn obstacles() {
 /// one by one.
 #[test]
 fn many_obstacles() {
-    let small =
-        DiscreteObstacles { size: [3.0, 2.0], count: 600, sides: [0.1, 0.9], platform: 0.5, ..Default::default() };
-    let heights = small.heights().expect("heights");
-    let mut random = crate::KeyedRng::keyed(small.seed, 0, "discrete obstacles");
-    let mut expected = Array2::<f64>::zeros((21, 31));
-    for _ in 0..small.count {
-        let height = random.uniform_range(0.05, 0.2);
-        let mut place = |cells: usize| {
-            let side = ((random.uniform_range(0.1, 0.9) / 0.1).round() as usize).clamp(1, cells);
-            let first = ((random.uniform() * (cells - side + 1) as f64) as usize).min(cells - side);
-            first..first + side + 1
-        };
-        let (columns, rows) = (place(30), place(20));
-        rows.for_each(|r| columns.clone().for_each(|c| expected[(r, c)] = height));
+    for [wide, deep] in [[30, 20], [20, 30]] {
+        let size = [wide, deep].map(|cells| 0.1 * cells as f64);
+        let small = DiscreteObstacles { size, count: 600, sides: [0.1, 0.9], platform: 0.5, ..Default::default() };
+        let heights = small.heights().expect("heights");
+        let mut random = crate::KeyedRng::keyed(small.seed, 0, "discrete obstacles");
+        let mut expected = Array2::<f64>::zeros((deep + 1, wide + 1));
+        for _ in 0..small.count {
+            let height = random.uniform_range(0.05, 0.2);
+            let mut place = |cells: usize| {
+                let side = ((random.uniform_range(0.1, 0.9) / 0.1).round() as usize).clamp(1, cells);
+                let first = ((random.uniform() * (cells - side + 1) as f64) as usize).min(cells - side);
+                first..first + side + 1
+            };
+            let (columns, rows) = (place(wide), place(deep));
+            rows.for_each(|r| columns.clone().for_each(|c| expected[(r, c)] = height));
+        }
+        let on_platform = |r: usize, c: usize| r.abs_diff(deep / 2) <= 2 && c.abs_diff(wide / 2) <= 2;
+        expected.indexed_iter_mut().filter(|((r, c), _)| on_platform(*r, *c)).for_each(|(_, height)| *height = 0.0);
+        assert_eq!(heights, expected);
     }
-    let on_platform = |r: usize, c: usize| (8..=12).contains(&r) && (13..=17).contains(&c);
-    expected.indexed_iter_mut().filter(|((r, c), _)| on_platform(*r, *c)).for_each(|(_, height)| *height = 0.0);
-    assert_eq!(heights, expected);
 
     // The largest count in a large field: point by point, these are 2.5e10 assignments.
     let large = DiscreteObstacles {

@@ -11,6 +11,7 @@ use crate::objects::shape::ObjectShape;
 use crate::pattern::closest_names;
 use crate::simulation_cfg::SimulationManagerCfg;
 use kinetoscope_robot::urdf::UrdfCfg;
+use kinetoscope_scene::input_file;
 use kinetoscope_scene::source_location::SourceLocation;
 use kinetoscope_scene::yaml::{YamlError, parse};
 use serde::Deserialize;
@@ -52,7 +53,7 @@ impl SceneCfg {
     /// As [`from_file`](Self::from_file).
     pub fn from_file_with(path: impl AsRef<Path>, types: &EntityTypes) -> Result<Self> {
         let path = path.as_ref();
-        let text = std::fs::read_to_string(path).map_err(|error| Error::File { path: path.into(), error })?;
+        let text = input_file::read_named_text(path).map_err(|error| Error::File { path: path.into(), error })?;
         let yaml = ["yaml", "yml", "json"];
         let is_yaml = path.extension().is_some_and(|end| yaml.iter().any(|yaml| end.eq_ignore_ascii_case(yaml)));
         if is_yaml { Self::from_yaml(&text, path, types) } else { Self::from_toml(&text, path, types) }

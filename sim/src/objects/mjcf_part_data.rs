@@ -9,6 +9,7 @@ use kinetoscope_mujoco as mj;
 use kinetoscope_mujoco::{CompileError, LoadError, Model, mjcf_keywords};
 use kinetoscope_robot::diagnostic::{Diagnostic, DiagnosticKind};
 use kinetoscope_scene::Pose;
+use kinetoscope_scene::input_file;
 use kinetoscope_scene::pose::from_row;
 use kinetoscope_scene::source_location::SourceLocation;
 use kinetoscope_sensors::EngineSensor;
@@ -244,7 +245,7 @@ pub(crate) fn read_and_compile(
     let (text, compiled) = match text {
         Some(text) => (text.to_string(), mj::compile(text, &[])),
         None => {
-            let read = std::fs::read_to_string(path);
+            let read = input_file::read_named_text(path);
             let text = read.map_err(|error| Error::File { path: path.to_path_buf(), error })?;
             (text, mj::compile_file(path))
         }

@@ -18,7 +18,7 @@ use crate::randomization::{NamedValue, Property};
 use crate::wrenches::Wrenches;
 use kinetoscope_mujoco as mj;
 use kinetoscope_mujoco::{Buffers, EngineError, IntegrationState, UserInputs, Warning, Weld};
-use kinetoscope_scene::AtomicFile;
+use kinetoscope_scene::{AtomicFile, input_file};
 use sha2::{Digest, Sha256};
 use std::io::Write as _;
 use std::path::Path;
@@ -54,7 +54,8 @@ impl Snapshot {
     /// restored.
     pub fn load(path: impl AsRef<Path>) -> Result<Self> {
         let path = path.as_ref();
-        let bytes = std::fs::read(path).map_err(|error| Error::File { path: path.into(), error })?;
+        let bytes =
+            input_file::read_referenced(path, u64::MAX).map_err(|error| Error::File { path: path.into(), error })?;
         Ok(Self::decode(&bytes, path)?)
     }
 

@@ -204,14 +204,9 @@ fn with_default_material(parts: &[MeshPart], otherwise: &Material) -> Vec<Visual
 }
 
 fn read_texture(source: &TextureSource) -> Result<Texture, String> {
-    let (bytes, name) = match source {
-        TextureSource::File(path) => {
-            let bytes = std::fs::read(path).map_err(|e| format!("{}: {e}", path.display()))?;
-            (std::borrow::Cow::Owned(bytes), path.display().to_string())
-        }
-        TextureSource::Embedded(bytes) => (std::borrow::Cow::Borrowed(&bytes[..]), "an image in the mesh file".into()),
-    };
-    let image = image::load_from_memory(&bytes).map_err(|e| format!("{name}: {e}"))?.into_rgb8();
-    Texture::new(TextureKind::TwoD, image.width(), image.height(), 3, image.as_raw())
-        .map_err(|e| format!("{name}: {e}"))
+    let image = source.decode()?;
+    Texture::new(TextureKind::TwoD, image.width(), image.height(), 3, image.as_raw()).map_err(|e| match source {
+        TextureSource::File(path) => format!("{}: {e}", path.display()),
+        TextureSource::Embedded(_) => format!("an image in the mesh file: {e}"),
+    })
 }

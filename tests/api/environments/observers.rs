@@ -5,6 +5,7 @@ use kinetoscope::prelude::*;
 use kinetoscope::sensors::Imu;
 use kinetoscope::sim::{Error, Observer, ObserverId, RigidObjectId, SimEvent};
 use kinetoscope_testkit::worlds::{add_ball, object, row};
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Arc, Mutex};
 
 /// The received events, with the step of the first environment.
@@ -74,6 +75,22 @@ fn steps_of_their_own() {
         assert_eq!(here.lin_acc_b(), there.lin_acc_b());
         assert_eq!(here.sample_counts(), there.sample_counts());
     }
+}
+
+/// The panic of an observer reaches the caller after the others were notified, and the observer stays.
+#[test]
+fn panic() {
+    let (mut sim, ..) = scene();
+    let (first, failing) = TestObserver::new(1, |sim, _| assert_ne!(steps(sim), 2, "at step 2"));
+    let (second, later) = TestObserver::new(1, |sim, _| assert_ne!(steps(sim), 2, "of the second"));
+    sim.observers_mut().add(first);
+    sim.observers_mut().add(second);
+    sim.update(1);
+    let panic = catch_unwind(AssertUnwindSafe(|| sim.update(1))).unwrap_err();
+    let message = panic.downcast_ref::<String>().unwrap();
+    assert!(message.contains("at step 2"), "{message}");
+    sim.update(2);
+    assert_eq!((read_log(&failing), read_log(&later)), (every(1, 4), every(1, 4)));
 }
 
 /// Look-up by type, in the order of addition. Removed observers and observers of another simulation are not found.

@@ -37,6 +37,7 @@ use kinetoscope_sim::{Observer, ObserverId, SimEvent, SimulationManager};
 use page::FrameAncestors;
 use serde::{Deserialize, Serialize};
 use server::{Server, ServerContext};
+use std::fmt;
 use std::net::SocketAddr;
 use std::sync::{Arc, Weak};
 use viewer_session::ViewerHub;
@@ -82,12 +83,18 @@ impl Default for ServeCfg {
 
 /// Handle of a browser view. Dropping the handle has no effect: the view ends when it is [closed](Self::close) or the
 /// simulation is dropped.
-#[derive(Debug)]
 pub struct ServerHandle {
     url: String,
     address: SocketAddr,
     context: Weak<ServerContext>,
     host: ObserverId<ServerObserver>,
+}
+
+impl fmt::Debug for ServerHandle {
+    /// Without the token, so that a log does not give access.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("ServerHandle").field("address", &self.address).finish_non_exhaustive()
+    }
 }
 
 impl ServerHandle {

@@ -13,7 +13,7 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 use tungstenite::handshake::derive_accept_key;
 
-/// Number of connections in addition to viewers: page loads, and silent connections until their timeout.
+/// Number of connections in addition to viewers: page loads, and silent connections.
 const MAX_OTHER_CONNECTIONS: usize = 32;
 /// Interval between two checks for new connections.
 const ACCEPT_INTERVAL: Duration = Duration::from_millis(15);
@@ -38,8 +38,26 @@ pub(super) struct ServerContext {
 #[derive(Default)]
 struct Connections {
     next: u64,
-    open: BTreeMap<u64, TcpStream>,
+    /// Connections by number, so the oldest comes first.
+    open: BTreeMap<u64, OpenConnection>,
     threads: Vec<JoinHandle<()>>,
+}
+
+struct OpenConnection {
+    stream: TcpStream,
+    /// True until the client has sent a whole request.
+    awaits_request: bool,
+}
+
+impl Connections {
+    /// Closes the oldest connection whose client has not sent a whole request. Browsers send theirs at once, so silent
+    /// clients cannot keep them out. Returns false if there is no such connection.
+    fn close_oldest_silent(&mut self) -> bool {
+        let oldest = self.open.iter().find(|(_, connection)| connection.awaits_request).map(|(number, _)| *number);
+        let closed = oldest.and_then(|number| self.open.remove(&number));
+        // An error means that the connection is already closed.
+        closed.map(|connection| connection.stream.shutdown(Shutdown::Both)).is_some()
+    }
 }
 
 impl ServerContext {
@@ -111,9 +129,9 @@ impl Drop for Server {
         }
         let threads = {
             let mut connections = self.context.connections();
-            for stream in connections.open.values() {
+            for connection in connections.open.values() {
                 // An error means that the connection is already closed.
-                let _ = stream.shutdown(Shutdown::Both);
+                let _ = connection.stream.shutdown(Shutdown::Both);
             }
             std::mem::take(&mut connections.threads)
         };
@@ -142,16 +160,19 @@ fn listen(listener: &TcpListener, context: &Arc<ServerContext>) {
     }
 }
 
-/// Starts the thread of a connection; closes the connection without a response if there are too many.
+/// Starts the thread of a connection. If there are too many, the oldest silent one is closed; if none is silent, the new
+/// one is closed without a response.
 fn spawn_connection(mut stream: TcpStream, context: &Arc<ServerContext>) {
     // Accepted sockets may inherit the non-blocking mode of the listener on some systems (not on Linux).
     if stream.set_nonblocking(false).is_err() || stream.set_nodelay(true).is_err() {
         return;
     }
     let Ok(waker) = stream.try_clone() else { return };
+    let waker = OpenConnection { stream: waker, awaits_request: true };
     let number = {
         let mut connections = context.connections();
-        if connections.open.len() >= context.max_viewers + MAX_OTHER_CONNECTIONS {
+        let is_full = connections.open.len() >= context.max_viewers + MAX_OTHER_CONNECTIONS;
+        if is_full && !connections.close_oldest_silent() {
             drop(connections);
             // The connection is closed without a response, which could block. So many connections do not come from
             // browsers.
@@ -165,7 +186,7 @@ fn spawn_connection(mut stream: TcpStream, context: &Arc<ServerContext>) {
     let entry = ConnectionEntry { context: Arc::clone(context), number };
     let thread = std::thread::Builder::new().name("view-talk".into());
     let talk = move || {
-        serve_connection(&mut stream, &entry.context);
+        serve_connection(&mut stream, &entry);
         // Closes the connection for the client too, although `waker` still holds the socket.
         let _ = stream.shutdown(Shutdown::Both);
         drop(entry);
@@ -180,6 +201,14 @@ fn spawn_connection(mut stream: TcpStream, context: &Arc<ServerContext>) {
 struct ConnectionEntry {
     context: Arc<ServerContext>,
     number: u64,
+}
+
+impl ConnectionEntry {
+    fn set_request_received(&self) {
+        if let Some(connection) = self.context.connections().open.get_mut(&self.number) {
+            connection.awaits_request = false;
+        }
+    }
 }
 
 impl Drop for ConnectionEntry {
@@ -205,13 +234,15 @@ impl Drop for ViewerSlot<'_> {
     }
 }
 
-fn serve_connection(stream: &mut TcpStream, context: &ServerContext) {
+fn serve_connection(stream: &mut TcpStream, entry: &ConnectionEntry) {
+    let context = &*entry.context;
     let head = match RequestHead::read(stream) {
         Ok(Some(head)) => head,
         Ok(None) => return,
         // The method of a request that cannot be parsed is unknown.
         Err(status) => return send_error(stream, status, true),
     };
+    entry.set_request_received();
     let with_body = head.method != "HEAD";
     if let Err(status) = context.policy.check(&head) {
         return send_error(stream, status, with_body);

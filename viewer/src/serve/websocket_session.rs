@@ -7,7 +7,7 @@ use super::command::{Command, Seen};
 use super::server::ServerContext;
 use super::view_backend::ViewSession;
 use serde_json::json;
-use std::io::{ErrorKind, Read, Write};
+use std::io::{self, ErrorKind, Read, Write};
 use std::net::TcpStream;
 use std::time::{Duration, Instant};
 use tungstenite::protocol::frame::CloseFrame;
@@ -15,8 +15,14 @@ use tungstenite::protocol::frame::coding::CloseCode;
 use tungstenite::protocol::{Role, WebSocketConfig};
 use tungstenite::{Bytes, Error, Message, WebSocket};
 
-/// Write timeout, after which a viewer is disconnected.
+/// Time without progress of a write after which a viewer is disconnected.
 pub(super) const WRITE_TIMEOUT: Duration = Duration::from_secs(5);
+/// Time of a whole message after which a viewer is disconnected. An image of 300 kB passes a line of 150 kbit/s.
+const MESSAGE_TIMEOUT: Duration = Duration::from_secs(16);
+/// Number of commands that a viewer may send at once, and per second afterwards. The page sends at most about 120 per
+/// second, acknowledgments included.
+const MAX_COMMANDS: f64 = 2000.0;
+const COMMANDS_PER_SECOND: f64 = 200.0;
 /// Time without messages after which a viewer is disconnected. Pages answer pings.
 const READ_TIMEOUT: Duration = Duration::from_secs(15);
 const PING_INTERVAL: Duration = Duration::from_secs(4);
@@ -32,13 +38,64 @@ const STATE_INTERVAL: Duration = Duration::from_millis(40);
 /// Minimum interval between two checks for new images.
 const IMAGE_CHECK_INTERVAL: Duration = Duration::from_millis(25);
 
+/// A stream whose messages have a deadline. Without it, a client that reads a byte every few seconds would hold the place
+/// of a viewer.
+struct TimedStream<'a> {
+    stream: &'a TcpStream,
+    deadline: Instant,
+}
+
+impl Read for TimedStream<'_> {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        self.stream.read(buffer)
+    }
+}
+
+impl Write for TimedStream<'_> {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        let left = self.deadline.saturating_duration_since(Instant::now());
+        if left.is_zero() {
+            return Err(ErrorKind::TimedOut.into());
+        }
+        self.stream.set_write_timeout(Some(left.min(WRITE_TIMEOUT)))?;
+        self.stream.write(bytes)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.stream.flush()
+    }
+}
+
+/// Limits the rate of commands: a bucket of tokens, one for each command.
+struct CommandRate {
+    tokens: f64,
+    last: Instant,
+}
+
+impl CommandRate {
+    fn new(now: Instant) -> Self {
+        Self { tokens: MAX_COMMANDS, last: now }
+    }
+
+    /// Takes a token. Returns false if the bucket is empty.
+    fn take(&mut self, now: Instant) -> bool {
+        let refilled = COMMANDS_PER_SECOND * now.saturating_duration_since(self.last).as_secs_f64();
+        self.tokens = (self.tokens + refilled).min(MAX_COMMANDS);
+        self.last = now;
+        let is_allowed = self.tokens >= 1.0;
+        self.tokens -= f64::from(u8::from(is_allowed));
+        is_allowed
+    }
+}
+
 /// WebSocket session of one browser.
-struct WebSocketSession<'a, S> {
-    socket: WebSocket<S>,
+struct WebSocketSession<'a> {
+    socket: WebSocket<TimedStream<'a>>,
     context: &'a ServerContext,
     session: Box<dyn ViewSession>,
     unseen_images: u32,
     unseen_states: u32,
+    rate: CommandRate,
     last_received: Instant,
     last_ping: Instant,
     last_image_check: Instant,
@@ -63,11 +120,17 @@ pub(super) fn run_session(
     let now = Instant::now();
     let Some(past) = now.checked_sub(STATE_INTERVAL + IMAGE_CHECK_INTERVAL) else { return };
     let mut viewer = WebSocketSession {
-        socket: WebSocket::from_partially_read(&*stream, rest, Role::Server, Some(config)),
+        socket: WebSocket::from_partially_read(
+            TimedStream { stream: &*stream, deadline: now + MESSAGE_TIMEOUT },
+            rest,
+            Role::Server,
+            Some(config),
+        ),
         context,
         session,
         unseen_images: 0,
         unseen_states: 0,
+        rate: CommandRate::new(now),
         last_received: now,
         last_ping: now,
         last_image_check: past,
@@ -79,7 +142,7 @@ pub(super) fn run_session(
     kinetoscope_http::drain(stream);
 }
 
-impl<S: Read + Write> WebSocketSession<'_, S> {
+impl WebSocketSession<'_> {
     fn poll(&mut self, stream: &TcpStream) -> Result<(), SessionEnded> {
         if self.context.is_closing() {
             return self.close(CloseCode::Away, "the simulation has ended");
@@ -147,6 +210,9 @@ impl<S: Read + Write> WebSocketSession<'_, S> {
             Err(_) => return Err(SessionEnded),
         };
         self.last_received = Instant::now();
+        if !self.rate.take(self.last_received) {
+            return self.close(CloseCode::Policy, "too many commands");
+        }
         match message {
             Message::Text(text) => self.handle_text(&text),
             Message::Binary(_) => self.close(CloseCode::Unsupported, "commands must be text"),
@@ -182,8 +248,9 @@ impl<S: Read + Write> WebSocketSession<'_, S> {
         }
     }
 
-    /// Sends a message. A write timeout ends the session.
+    /// Sends a message. A timeout ends the session.
     fn send(&mut self, message: Message) -> Result<(), SessionEnded> {
+        self.socket.get_mut().deadline = Instant::now() + MESSAGE_TIMEOUT;
         self.socket.send(message).map_err(|_| SessionEnded)
     }
 
@@ -197,4 +264,45 @@ impl<S: Read + Write> WebSocketSession<'_, S> {
 
 fn is_timeout(error: &std::io::Error) -> bool {
     matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut | ErrorKind::Interrupted)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::net::TcpListener;
+
+    #[test]
+    fn command_rate() {
+        let start = Instant::now();
+        let mut rate = CommandRate::new(start);
+        let count = |rate: &mut CommandRate, now| (0..10_000).take_while(|_| rate.take(now)).count();
+        assert_eq!(count(&mut rate, start), 2000);
+        assert_eq!(count(&mut rate, start + Duration::from_millis(500)), 100);
+        // The bucket holds no more than it did at first.
+        assert_eq!(count(&mut rate, start + Duration::from_secs(1000)), 2000);
+    }
+
+    /// A client that reads slowly, but without a pause, does not extend the time of a message.
+    #[test]
+    fn message_deadline() {
+        let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+        let client = TcpStream::connect(listener.local_addr().unwrap()).unwrap();
+        let (server, _) = listener.accept().unwrap();
+        let reader = std::thread::spawn(move || {
+            let mut client = client;
+            let mut chunk = [0; 4096];
+            while client.read(&mut chunk).is_ok_and(|n| n > 0) {
+                std::thread::sleep(Duration::from_millis(2));
+            }
+        });
+        let start = Instant::now();
+        let mut stream = TimedStream { stream: &server, deadline: start + Duration::from_millis(300) };
+        // At 2 MB/s at most, this takes more than 30 s; the buffers of the system hold a few megabytes.
+        let error = stream.write_all(&vec![0; 64 << 20]).unwrap_err();
+        let taken = start.elapsed();
+        assert!(is_timeout(&error), "{error}");
+        assert!((0.29..5.0).contains(&taken.as_secs_f64()), "{taken:?}");
+        drop(server);
+        reader.join().unwrap();
+    }
 }

@@ -125,6 +125,12 @@ fn token() {
     ] {
         assert_eq!(status(local, path, headers), expected, "{path}");
     }
+    // A log of the handle does not give access.
+    let mut sim = scene(1);
+    let served = sim.serve("0.0.0.0:0").unwrap();
+    let token = served.url().split_once("/?token=").unwrap().1;
+    let text = format!("{served:?}");
+    assert!(text.contains(&served.address().port().to_string()) && !text.contains(token), "{text}");
 }
 
 #[test]

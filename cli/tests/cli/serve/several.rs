@@ -67,7 +67,8 @@ fn slow_viewers() {
         assert!(start.elapsed() < Duration::from_secs(90), "{} viewers", running.viewers());
         alive.wait_image("stage", |_, _| true);
     }
-    assert!(talk.join().unwrap() > 1000, "buffers take more than a few answers");
+    // It is disconnected for its number of commands, the other one for its silence.
+    assert!(talk.join().unwrap() > 1000, "a viewer may send many commands at once");
     let given_up_after = start.elapsed();
     assert!(given_up_after > Duration::from_secs(3), "{given_up_after:?}: a viewer may be slow for a moment");
     let now = running.now();
@@ -126,9 +127,12 @@ fn silent_connections() {
     let mut viewer = TestClient::connect(running.address);
     let silent: Vec<_> = (0..120).map(|_| connect(running.address)).collect();
     viewer.wait_state("the viewer is served", |state| state["viewers"] == 1);
-    drop(silent);
+    // A new client is served at once: the oldest silent connection is closed for it.
     let get = b"GET / HTTP/1.1\r\nHost: localhost\r\n\r\n";
-    wait::until("there is room again", || status_of(&exchange(running.address, get)) == 200);
+    for _ in 0..3 {
+        assert_eq!(status_of(&exchange(running.address, get)), 200);
+    }
+    drop(silent);
     // Clients that disconnect at once get no response.
     for _ in 0..20 {
         connect(running.address).shutdown(std::net::Shutdown::Both).unwrap();

@@ -15,6 +15,7 @@ use kinetoscope_render::Renderer;
 use kinetoscope_render::lens::{Lens, LensModel};
 use kinetoscope_render::lens::{OpenCv, OpenCvFisheye};
 use kinetoscope_render::{Intrinsics, PixelIntrinsics};
+use kinetoscope_scene::input_file;
 use kinetoscope_scene::pattern::closest_names;
 use kinetoscope_scene::yaml::{Node, Scalar, Value};
 use nalgebra::{Matrix3, Matrix3x4};
@@ -151,7 +152,7 @@ impl CameraInfo {
     /// The first problem, with file and line, or field.
     pub fn read(path: impl AsRef<Path>) -> Result<Self, CalibrationError> {
         let path = path.as_ref();
-        let text = std::fs::read_to_string(path)
+        let text = input_file::read_named_text(path)
             .map_err(|error| CalibrationError::File { path: path.into(), error: error.to_string() })?;
         Self::parse(&text, &path.display().to_string())
     }

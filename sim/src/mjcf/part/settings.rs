@@ -4,7 +4,8 @@
 use super::OmittedElement;
 use kinetoscope_mujoco::Model;
 use kinetoscope_robot::diagnostic::{Diagnostic, DiagnosticKind};
-use kinetoscope_scene::source_location::SourceLocation;
+use kinetoscope_scene::input_file;
+use kinetoscope_scene::source_location::{LineStarts, SourceLocation};
 use std::path::Path;
 use std::sync::Arc;
 
@@ -27,12 +28,12 @@ struct TopLevelElement {
 fn collect_top_level(text: &str, file: &Path, folder: &Path, found: &mut Vec<TopLevelElement>, files: &mut usize) {
     *files += 1;
     let Ok(document) = roxmltree::Document::parse(text) else { return };
-    let shared = Arc::new(file.to_path_buf());
+    let (shared, lines) = (Arc::new(file.to_path_buf()), LineStarts::new(text));
     for node in document.root_element().children().filter(roxmltree::Node::is_element) {
         if node.tag_name().name() == "include" {
             let Some(path) = node.attribute("file").map(|name| folder.join(name)) else { continue };
-            if let Ok(text) = std::fs::read_to_string(&path)
-                && *files < MAX_INCLUDED_FILES
+            if *files < MAX_INCLUDED_FILES
+                && let Ok(text) = input_file::read_referenced_text(&path)
             {
                 collect_top_level(&text, &path, folder, found, files);
             }
@@ -43,7 +44,7 @@ fn collect_top_level(text: &str, file: &Path, folder: &Path, found: &mut Vec<Top
         let attributes =
             attributes.chain(flags.flat_map(|flag| flag.attributes()).map(|a| format!("flag {}", a.name())));
         let source = |node: roxmltree::Node<'_, '_>| {
-            let line = document.text_pos_at(node.range().start).row;
+            let line = lines.line(node.range().start);
             SourceLocation { file: Arc::clone(&shared), line }
         };
         found.push(TopLevelElement {

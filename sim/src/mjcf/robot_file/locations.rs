@@ -1,6 +1,7 @@
 //! Locations of the named elements of a file and of the files it includes.
 
-use kinetoscope_scene::source_location::SourceLocation;
+use kinetoscope_scene::input_file;
+use kinetoscope_scene::source_location::{LineStarts, SourceLocation};
 use std::collections::HashMap;
 use std::path::Path;
 use std::sync::Arc;
@@ -27,13 +28,13 @@ impl SourceLocations {
     fn add(&mut self, text: &str, file: &Path, folder: &Path, files: &mut usize) {
         *files += 1;
         let Ok(document) = roxmltree::Document::parse(text) else { return };
-        let shared = Arc::new(file.to_path_buf());
+        let (shared, lines) = (Arc::new(file.to_path_buf()), LineStarts::new(text));
         for node in document.descendants().filter(roxmltree::Node::is_element) {
             let tag = node.tag_name().name();
             if tag == "include"
                 && let Some(path) = node.attribute("file").map(|name| folder.join(name))
                 && *files < MAX_INCLUDED_FILES
-                && let Ok(text) = std::fs::read_to_string(&path)
+                && let Ok(text) = input_file::read_referenced_text(&path)
             {
                 self.add(&text, &path, folder, files);
             }
@@ -45,7 +46,7 @@ impl SourceLocations {
                 _ if tag == "freejoint" => "joint",
                 _ => tag,
             };
-            let line = document.text_pos_at(node.range().start).row;
+            let line = lines.line(node.range().start);
             let key = (kind.to_string(), name.to_string());
             self.named.entry(key).or_insert_with(|| SourceLocation { file: Arc::clone(&shared), line });
         }
