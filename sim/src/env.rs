@@ -41,9 +41,14 @@ pub enum Divergence {
     Warning(Warning),
     /// MuJoCo's engine reported an error.
     Engine(EngineError),
-    /// Contacts or constraints need more memory than the limit of an environment, 2 GiB. Contains the sizes that the
-    /// buffers would have grown to.
-    BuffersExhausted(Buffers),
+    /// Contacts or constraints need more memory than the limit of an environment, 2 GiB.
+    BuffersExhausted {
+        /// Sizes that the buffers would have grown to.
+        buffers: Buffers,
+        /// Names of the bodies with the most contacts in MuJoCo's model, at most ten, without the world. Empty in a status
+        /// that was read from a file.
+        bodies: Vec<String>,
+    },
 }
 
 impl std::fmt::Display for Divergence {
@@ -51,7 +56,12 @@ impl std::fmt::Display for Divergence {
         match self {
             Self::Warning(warning) => write!(f, "{}", warning.name()),
             Self::Engine(error) => write!(f, "{error}"),
-            Self::BuffersExhausted(buffers) => write!(f, "contacts and constraints do not fit into {buffers:?}"),
+            Self::BuffersExhausted { buffers, bodies } => {
+                let Buffers { contacts, constraints, .. } = buffers;
+                write!(f, "{contacts} contacts or {constraints} constraint rows do not fit into 2 GiB; ")?;
+                write!(f, "expected fewer bodies that overlap")?;
+                if bodies.is_empty() { Ok(()) } else { write!(f, "; most contacts: {}", bodies.join(", ")) }
+            }
         }
     }
 }
@@ -90,6 +100,8 @@ pub struct SimEnv {
     raw_quats: UnnormalizedQuats,
     /// Number of times a buffer was doubled, in all working memory of a batch.
     buffer_growths: Arc<AtomicU64>,
+    /// Memory of `data` above which its buffers no longer grow \[bytes\].
+    max_bytes: usize,
     /// Version of the row of which `data` still holds everything, or 0; see [`EnvRow::version`].
     held: u64,
     /// Last version that this environment gave to a row. The upper bits differ between the environments of a batch.
@@ -130,6 +142,7 @@ impl SimEnv {
             stage: Stage::Raw,
             raw_quats: UnnormalizedQuats::new(model),
             buffer_growths: Arc::default(),
+            max_bytes: step::MAX_ENV_BYTES,
             held: 0,
             last_version: 0,
         };
@@ -150,6 +163,7 @@ impl SimEnv {
             stage: Stage::Raw,
             raw_quats: self.raw_quats.clone(),
             buffer_growths: Arc::clone(&self.buffer_growths),
+            max_bytes: self.max_bytes,
             held: 0,
             last_version: Self::first_version(slot),
         })

@@ -5,14 +5,18 @@ use crate::capture::{CaptureRequest, CapturedStep};
 use crate::row::{ColdState, EnvRow};
 use kinetoscope_mujoco as mj;
 use kinetoscope_mujoco::{
-    Data, EngineError, IntegrationState, Overflow, SolvedState, UserInputs, Warning, WarningCounts,
+    Data, EngineError, IntegrationState, ObjectKind, Overflow, SolvedState, UserInputs, Warning, WarningCounts,
 };
 use kinetoscope_scene::Contact;
 use std::cell::Cell;
+use std::cmp::Reverse;
 use std::sync::atomic::Ordering;
 
 /// Memory of one environment above which its buffers no longer grow \[bytes\].
-const MAX_ENV_BYTES: usize = 2 << 30;
+pub(super) const MAX_ENV_BYTES: usize = 2 << 30;
+
+/// Largest number of bodies in an error.
+const MAX_NAMED_BODIES: usize = 10;
 
 impl SimEnv {
     /// Does `count` MuJoCo steps. A diverged environment does not step.
@@ -327,12 +331,30 @@ impl SimEnv {
         }
     }
 
+    /// Names of the bodies with the most contacts, at most ten, without the world.
+    fn crowded_bodies(&self) -> Vec<String> {
+        let model = self.data.model();
+        let mut contacts = vec![0_usize; model.nbody()];
+        for contact in self.data.contact() {
+            for geom in [contact.geom1, contact.geom2] {
+                // Contacts of flexes have no geom.
+                let body = usize::try_from(geom).ok().and_then(|geom| model.geom_bodyid().get(geom));
+                if let Some(count) = body.and_then(|body| contacts.get_mut(*body as usize)) {
+                    *count += 1;
+                }
+            }
+        }
+        let mut bodies: Vec<usize> = (1..contacts.len()).filter(|body| contacts[*body] > 0).collect();
+        bodies.sort_by_key(|body| (Reverse(contacts[*body]), *body));
+        bodies.iter().take(MAX_NAMED_BODIES).filter_map(|body| model.name(ObjectKind::Body, *body)).collect()
+    }
+
     /// Replaces the data by data with twice the buffer size of `what`, in the state that is stored in the row, and with
-    /// the same results. Data that is already larger than [`MAX_ENV_BYTES`] is an error.
+    /// the same results. Data that is already larger than the limit is an error.
     fn grow_buffers(&mut self, what: Overflow, kept: Inputs) -> Result<(), Divergence> {
         let buffers = self.data.model().buffers().enlarged(what);
-        if self.data.bytes() > MAX_ENV_BYTES {
-            return Err(Divergence::BuffersExhausted(buffers));
+        if self.data.bytes() > self.max_bytes {
+            return Err(Divergence::BuffersExhausted { buffers, bodies: self.crowded_bodies() });
         }
         let base = self.base.with_buffers(buffers);
         let model = self.row.patch.as_ref().map_or_else(|| base.clone(), |patch| base.clone().patched(patch));
@@ -431,5 +453,35 @@ fn classify_step(done: Result<(), EngineError>, raised: &WarningCounts) -> StepO
             (None, Some(warning)) => StepOutcome::Diverged(Divergence::Warning(warning)),
             (None, None) => StepOutcome::Succeeded,
         },
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use mj::Buffers;
+    use std::sync::Arc;
+
+    /// Spheres of 0.1 m radius in a row on the ground. Moved onto each other, they have more contacts than the buffers hold.
+    #[test]
+    fn exhausted_buffers() {
+        let sphere = |k: usize| format!("<body name='s{k}' pos='{k} 0 0.1'><freejoint/><geom size='0.1'/></body>");
+        let spheres: String = (0..12).map(sphere).collect();
+        let text = format!("<mujoco><worldbody><geom type='plane' size='20 1 1'/>{spheres}</worldbody></mujoco>");
+        let model = mj::compile(&text, &[]).expect("compiles").into_model();
+        let few = Buffers { contacts: 12, constraints: 48, arena_bytes: 1 << 17 };
+        let mut env = SimEnv::new(&model.with_buffers(few), &Arc::default()).expect("small");
+        env.max_bytes = 0;
+        env.step(1);
+        assert_eq!(env.row.diverged.as_deref(), None, "contacts with the ground fit");
+        // The first ten are at one place; the last two stay alone.
+        env.write(|data| (0..10).for_each(|k| data.qpos_mut()[7 * k] = 1e-3 * k as f64));
+        env.step(1);
+        let Some(EnvStatus::Diverged { reason, .. }) = env.row.diverged.as_deref() else { panic!("it runs") };
+        let Divergence::BuffersExhausted { bodies, .. } = reason else { panic!("{reason}") };
+        assert!(bodies.len() <= 10 && bodies.iter().all(|name| name.starts_with('s')), "{bodies:?}");
+        assert!(["s0", "s1", "s2"].contains(&&*bodies[0]), "{bodies:?}");
+        let text = reason.to_string();
+        assert!(text.contains("do not fit into 2 GiB; expected fewer bodies that overlap; most contacts: s"), "{text}");
     }
 }

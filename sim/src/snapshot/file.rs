@@ -173,7 +173,7 @@ fn write_entry(entry: &EnvEntry, out: &mut ByteWriter) {
             out.u8(2);
             out.text(&error.message);
         }
-        Divergence::BuffersExhausted(Buffers { contacts, constraints, arena_bytes }) => {
+        Divergence::BuffersExhausted { buffers: Buffers { contacts, constraints, arena_bytes }, bodies: _ } => {
             out.u8(3);
             [contacts, constraints, arena_bytes].iter().for_each(|size| out.u64(**size as u64));
         }
@@ -226,7 +226,8 @@ fn read_entry(reader: &mut ByteReader<'_>, drive_count: usize) -> Result<EnvEntr
         2 => Some(Divergence::Engine(EngineError { message: reader.text()? })),
         3 => {
             let (contacts, constraints, arena_bytes) = (size(reader)?, size(reader)?, size(reader)?);
-            Some(Divergence::BuffersExhausted(Buffers { contacts, constraints, arena_bytes }))
+            let buffers = Buffers { contacts, constraints, arena_bytes };
+            Some(Divergence::BuffersExhausted { buffers, bodies: Vec::new() })
         }
         _ => return Err(Malformed("a status is unknown")),
     };
@@ -327,7 +328,7 @@ mod tests {
         for reason in [
             Divergence::Warning(Warning::BadAcceleration),
             Divergence::Engine(EngineError { message: "stäck".into() }),
-            Divergence::BuffersExhausted(buffers),
+            Divergence::BuffersExhausted { buffers, bodies: Vec::new() },
         ] {
             let snapshot = snapshot(reason);
             let read = decode(&snapshot.encode(FORMAT, &mj::version_string())).expect("whole");
