@@ -140,14 +140,18 @@ mod tests {
             let (mut server, _) = listener.accept().unwrap();
             let text = format!("GET /page HTTP/1.1\r\nHost: localhost{end}");
             let sent = std::thread::spawn(move || {
-                for byte in text.bytes() {
-                    client.write_all(&[byte]).unwrap();
+                client.set_nodelay(true).unwrap();
+                let (last, bytes) = text.as_bytes().split_last().unwrap();
+                for byte in bytes {
+                    client.write_all(&[*byte]).unwrap();
                     std::thread::sleep(Duration::from_micros(200));
                 }
+                client.write_all(&[*last, b'x', b'y']).unwrap();
                 client
             });
             let head = RequestHead::read(&mut server).unwrap().unwrap();
             assert_eq!((head.path.as_str(), head.header("host")), ("/page", Ok(Some("localhost"))));
+            assert_eq!(head.rest, b"xy");
             sent.join().unwrap();
         }
     }

@@ -16,8 +16,12 @@ pub const MAX_BINARY: u64 = 4 << 30;
 /// # Errors
 /// The file cannot be read, or is longer than `limit` \[bytes\], as a device such as `/dev/zero` is.
 pub fn read_named(path: &Path, limit: u64) -> Result<Vec<u8>> {
+    let file = File::open(path)?;
     let mut bytes = Vec::new();
-    File::open(path)?.take(limit.saturating_add(1)).read_to_end(&mut bytes)?;
+    // The size of a pipe or a device is 0. A byte more, so that the end is found without growing.
+    let expected = usize::try_from(file.metadata()?.len().min(limit)).unwrap_or(usize::MAX);
+    bytes.try_reserve_exact(expected.saturating_add(1))?;
+    file.take(limit.saturating_add(1)).read_to_end(&mut bytes)?;
     if bytes.len() as u64 > limit {
         return Err(Error::new(ErrorKind::FileTooLarge, format!("longer than {limit} bytes")));
     }

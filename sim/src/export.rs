@@ -337,7 +337,7 @@ fn export_texture(
     if let Some(known) = textures.get(&*bytes) {
         return Ok(Some(known.clone()));
     }
-    let Ok(image) = source.decode() else { return Ok(None) };
+    let Ok(image) = source.decode_from(&bytes) else { return Ok(None) };
     let texture = format!("{name}_texture");
     let file = format!("meshes/{texture}.png");
     let path = dir.join(&file);

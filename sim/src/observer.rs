@@ -293,7 +293,7 @@ impl SimulationManager {
     }
 
     /// Notifies the observers with these numbers. An observer that panics stays in the simulation, and the others are
-    /// notified before the panic of the first one continues.
+    /// notified before the panic of the first one continues; further panics are dropped.
     fn notify_listed(&mut self, numbers: impl IntoIterator<Item = u64>, tell: impl Fn(&mut dyn Observer, &mut Self)) {
         let mut first_panic = None;
         for number in numbers {
@@ -309,7 +309,7 @@ impl SimulationManager {
         // An observer that is handling an event receives no event of its own changes.
         let Some(slot) = self.observers.slots.iter_mut().find(|slot| slot.number == number) else { return Ok(()) };
         let Some(mut observer) = slot.observer.take() else { return Ok(()) };
-        // The observer's methods are the only code that runs here, and each of them leaves the simulation whole.
+        // The panic continues, so the caller learns that the simulation may be in the middle of the observer's change.
         let told = catch_unwind(AssertUnwindSafe(|| tell(observer.as_mut(), self)));
         // An observer that was removed meanwhile is dropped here.
         if let Some(slot) = self.observers.slots.iter_mut().find(|slot| slot.number == number) {

@@ -280,14 +280,15 @@ impl FoxgloveServer {
     }
 
     fn __repr__(&self) -> String {
-        format!("<FoxgloveServer {}>", self.inner.url())
+        // Without the token, so that a notebook or a log does not give access.
+        format!("<FoxgloveServer at {}>", self.inner.address())
     }
 }
 
 #[pymethods]
 impl Simulation {
     /// Streams topics to Foxglove while the simulation steps; port 0 selects a free port. An address such as
-    /// ``"0.0.0.0:8765"`` lets other machines read them: the server has no token. Keyword arguments are the fields of the
+    /// ``"0.0.0.0:8765"`` lets other machines read them, with the token that is part of ``url``. Keyword arguments are the fields of the
     /// Rust ``FoxgloveCfg``.
     #[pyo3(signature = (address="127.0.0.1:8765", topics=None, *, env_ids=None, period_steps=1, stream_periods=None,
         overview_size=None, overview_fps=None))]

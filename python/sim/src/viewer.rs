@@ -39,7 +39,8 @@ impl Server {
     }
 
     fn __repr__(&self) -> String {
-        format!("<Server {}>", self.inner.url())
+        // Without the token, so that a notebook or a log does not give access.
+        format!("<Server at {}>", self.inner.address())
     }
 }
 

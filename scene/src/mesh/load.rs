@@ -51,7 +51,8 @@ pub fn load(path: impl AsRef<Path>) -> Result<TriMesh, MeshError> {
 /// As [`load`].
 pub fn load_with(path: impl AsRef<Path>, options: &MeshOptions) -> Result<TriMesh, MeshError> {
     let path = path.as_ref();
-    load_bytes(path, &read(path)?, options)
+    let bytes = input_file::read_named(path, MAX_BINARY);
+    load_bytes(path, &bytes.map_err(|source| MeshError::Io { path: path.to_owned(), source })?, options)
 }
 
 /// Reads a mesh from the content of a file. `path` need not exist: its extension helps to detect the format, its name
@@ -67,6 +68,7 @@ pub fn load_bytes(path: impl AsRef<Path>, bytes: &[u8], options: &MeshOptions) -
     (format.read)(&ctx, bytes)
 }
 
+/// Reads a file that another file refers to.
 pub(super) fn read(path: &Path) -> Result<Vec<u8>, MeshError> {
     input_file::read_referenced(path, MAX_BINARY).map_err(|source| MeshError::Io { path: path.to_owned(), source })
 }

@@ -118,7 +118,8 @@ impl Reader {
             if beside(ctx.path, names).is_file() { vec![names] } else { names.split_whitespace().collect() };
         for name in candidates {
             let path = beside(ctx.path, name);
-            if !self.libraries.insert(path.clone()) {
+            let is_new = std::fs::canonicalize(&path).is_ok_and(|file| self.libraries.insert(file));
+            if !is_new {
                 continue;
             }
             let Ok(bytes) = input_file::read_referenced(&path, MAX_TEXT) else { continue };

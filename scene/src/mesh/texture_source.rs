@@ -12,9 +12,12 @@ const MAX_SIDE: u32 = 16_384;
 /// Number of pixels of an image that any file may hold: 4096 x 4096.
 const FREE_PIXELS: u64 = 4096 * 4096;
 
-/// Pixels per byte of a file beyond [`FREE_PIXELS`]: what deflate, the compression of PNG, yields at most (1032 to 1).
-/// A few kilobytes must not ask for gigabytes.
+/// Pixels per byte of a larger file: what deflate, the compression of PNG, yields at most for pixels of one byte (1032 to
+/// 1). A few kilobytes must not ask for gigabytes.
 const PIXELS_PER_BYTE: u64 = 1032;
+
+/// Largest memory of the decoder \[bytes\].
+const MAX_DECODED: u64 = 1 << 30;
 
 /// Source of a texture's pixels.
 #[derive(Clone, Debug, PartialEq)]
@@ -45,7 +48,15 @@ impl TextureSource {
     /// The reason as text, with the path: the file cannot be read, is no image, or is larger than 16,384 pixels along
     /// a side. Images of more than 4096 x 4096 pixels must hold at least a byte per 1032 pixels.
     pub fn decode(&self) -> Result<RgbImage, String> {
-        decode(&self.bytes()?).map_err(|reason| match self {
+        self.decode_from(&self.bytes()?)
+    }
+
+    /// Decodes the image from what [`bytes`](Self::bytes) returned.
+    ///
+    /// # Errors
+    /// As [`decode`](Self::decode).
+    pub fn decode_from(&self, bytes: &[u8]) -> Result<RgbImage, String> {
+        decode(bytes).map_err(|reason| match self {
             Self::File(path) => format!("{}: {reason}", path.display()),
             Self::Embedded(_) => format!("an image in the mesh file: {reason}"),
         })
@@ -64,8 +75,9 @@ fn decode(bytes: &[u8]) -> Result<RgbImage, String> {
         return Err(format!("{width} x {height} pixels in {size} bytes; expected at most {most} pixels for that size"));
     }
     let mut reader = reader()?;
-    // The limits above replace those of the decoder.
-    reader.limits(Limits::no_limits());
+    let mut limits = Limits::no_limits();
+    limits.max_alloc = Some(MAX_DECODED);
+    reader.limits(limits);
     reader.decode().map(image::DynamicImage::into_rgb8).map_err(|error| error.to_string())
 }
 
@@ -111,6 +123,11 @@ mod tests {
             let reason = TextureSource::Embedded(bytes).decode().unwrap_err();
             assert!(reason.starts_with("an image in the mesh file: ") && reason.contains(message), "{reason}");
         }
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn devices() {
         let reason = TextureSource::File("/dev/zero".into()).decode().unwrap_err();
         assert_eq!(reason, "/dev/zero: a device or a pipe; expected a regular file");
     }

@@ -171,7 +171,7 @@ fn spawn_connection(mut stream: TcpStream, context: &Arc<ServerContext>) {
     let waker = OpenConnection { stream: waker, awaits_request: true };
     let number = {
         let mut connections = context.connections();
-        let is_full = connections.open.len() >= context.max_viewers + MAX_OTHER_CONNECTIONS;
+        let is_full = connections.open.len().saturating_sub(context.viewers()) >= MAX_OTHER_CONNECTIONS;
         if is_full && !connections.close_oldest_silent() {
             drop(connections);
             // The connection is closed without a response, which could block. So many connections do not come from

@@ -17,12 +17,17 @@ use tungstenite::{Bytes, Error, Message, WebSocket};
 
 /// Time without progress of a write after which a viewer is disconnected.
 pub(super) const WRITE_TIMEOUT: Duration = Duration::from_secs(5);
-/// Time of a whole message after which a viewer is disconnected. An image of 300 kB passes a line of 150 kbit/s.
-const MESSAGE_TIMEOUT: Duration = Duration::from_secs(16);
-/// Number of commands that a viewer may send at once, and per second afterwards. The page sends at most about 120 per
-/// second, acknowledgments included.
-const MAX_COMMANDS: f64 = 2000.0;
-const COMMANDS_PER_SECOND: f64 = 200.0;
+/// Time of a whole message after which a viewer is disconnected, in addition to its length at [`MIN_RATE`].
+const MESSAGE_TIMEOUT: Duration = Duration::from_secs(8);
+/// Smallest rate at which a viewer may read a message \[bytes/s\].
+const MIN_RATE: f64 = 16_000.0;
+/// Number of messages that a viewer may send at once, and per second afterwards. On a display of 240 Hz, the page sends about
+/// 320 per second while a slider is dragged, acknowledgments included.
+const MAX_MESSAGES: f64 = 2000.0;
+const MESSAGES_PER_SECOND: f64 = 500.0;
+/// Number of reads of the socket for one message. A message takes three at most; frames without content, or of single bytes,
+/// would keep the session from everything else.
+const MAX_READS: u32 = 8;
 /// Time without messages after which a viewer is disconnected. Pages answer pings.
 const READ_TIMEOUT: Duration = Duration::from_secs(15);
 const PING_INTERVAL: Duration = Duration::from_secs(4);
@@ -43,10 +48,20 @@ const IMAGE_CHECK_INTERVAL: Duration = Duration::from_millis(25);
 struct TimedStream<'a> {
     stream: &'a TcpStream,
     deadline: Instant,
+    /// Number of reads until [`ErrorKind::WouldBlock`] is returned.
+    reads_left: u32,
+}
+
+impl TimedStream<'_> {
+    /// Starts the time of a message of `length` bytes.
+    fn restart(&mut self, length: usize) {
+        self.deadline = Instant::now() + MESSAGE_TIMEOUT + Duration::from_secs_f64(length as f64 / MIN_RATE);
+    }
 }
 
 impl Read for TimedStream<'_> {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        self.reads_left = self.reads_left.checked_sub(1).ok_or(ErrorKind::WouldBlock)?;
         self.stream.read(buffer)
     }
 }
@@ -66,21 +81,21 @@ impl Write for TimedStream<'_> {
     }
 }
 
-/// Limits the rate of commands: a bucket of tokens, one for each command.
-struct CommandRate {
+/// Limits the rate of messages: a bucket of tokens, one for each message.
+struct MessageRate {
     tokens: f64,
     last: Instant,
 }
 
-impl CommandRate {
+impl MessageRate {
     fn new(now: Instant) -> Self {
-        Self { tokens: MAX_COMMANDS, last: now }
+        Self { tokens: MAX_MESSAGES, last: now }
     }
 
     /// Takes a token. Returns false if the bucket is empty.
     fn take(&mut self, now: Instant) -> bool {
-        let refilled = COMMANDS_PER_SECOND * now.saturating_duration_since(self.last).as_secs_f64();
-        self.tokens = (self.tokens + refilled).min(MAX_COMMANDS);
+        let refilled = MESSAGES_PER_SECOND * now.saturating_duration_since(self.last).as_secs_f64();
+        self.tokens = (self.tokens + refilled).min(MAX_MESSAGES);
         self.last = now;
         let is_allowed = self.tokens >= 1.0;
         self.tokens -= f64::from(u8::from(is_allowed));
@@ -95,7 +110,7 @@ struct WebSocketSession<'a> {
     session: Box<dyn ViewSession>,
     unseen_images: u32,
     unseen_states: u32,
-    rate: CommandRate,
+    rate: MessageRate,
     last_received: Instant,
     last_ping: Instant,
     last_image_check: Instant,
@@ -121,7 +136,7 @@ pub(super) fn run_session(
     let Some(past) = now.checked_sub(STATE_INTERVAL + IMAGE_CHECK_INTERVAL) else { return };
     let mut viewer = WebSocketSession {
         socket: WebSocket::from_partially_read(
-            TimedStream { stream: &*stream, deadline: now + MESSAGE_TIMEOUT },
+            TimedStream { stream: &*stream, deadline: now + MESSAGE_TIMEOUT, reads_left: 0 },
             rest,
             Role::Server,
             Some(config),
@@ -130,7 +145,7 @@ pub(super) fn run_session(
         session,
         unseen_images: 0,
         unseen_states: 0,
-        rate: CommandRate::new(now),
+        rate: MessageRate::new(now),
         last_received: now,
         last_ping: now,
         last_image_check: past,
@@ -201,6 +216,9 @@ impl WebSocketSession<'_> {
 
     /// Reads and runs a command, if one arrives before the timeout.
     fn receive(&mut self) -> Result<(), SessionEnded> {
+        // Reading also answers pings.
+        self.socket.get_mut().restart(0);
+        self.socket.get_mut().reads_left = MAX_READS;
         let message = match self.socket.read() {
             Ok(message) => message,
             Err(Error::Io(error)) if is_timeout(&error) => return Ok(()),
@@ -211,7 +229,7 @@ impl WebSocketSession<'_> {
         };
         self.last_received = Instant::now();
         if !self.rate.take(self.last_received) {
-            return self.close(CloseCode::Policy, "too many commands");
+            return self.close(CloseCode::Policy, "too many messages");
         }
         match message {
             Message::Text(text) => self.handle_text(&text),
@@ -250,11 +268,12 @@ impl WebSocketSession<'_> {
 
     /// Sends a message. A timeout ends the session.
     fn send(&mut self, message: Message) -> Result<(), SessionEnded> {
-        self.socket.get_mut().deadline = Instant::now() + MESSAGE_TIMEOUT;
+        self.socket.get_mut().restart(message.len());
         self.socket.send(message).map_err(|_| SessionEnded)
     }
 
     fn close(&mut self, code: CloseCode, reason: &'static str) -> Result<(), SessionEnded> {
+        self.socket.get_mut().restart(0);
         // The session ends regardless of errors.
         let _ = self.socket.close(Some(CloseFrame { code, reason: reason.into() }));
         let _ = self.socket.flush();
@@ -272,12 +291,12 @@ mod tests {
     use std::net::TcpListener;
 
     #[test]
-    fn command_rate() {
+    fn message_rate() {
         let start = Instant::now();
-        let mut rate = CommandRate::new(start);
-        let count = |rate: &mut CommandRate, now| (0..10_000).take_while(|_| rate.take(now)).count();
+        let mut rate = MessageRate::new(start);
+        let count = |rate: &mut MessageRate, now| (0..10_000).take_while(|_| rate.take(now)).count();
         assert_eq!(count(&mut rate, start), 2000);
-        assert_eq!(count(&mut rate, start + Duration::from_millis(500)), 100);
+        assert_eq!(count(&mut rate, start + Duration::from_millis(500)), 250);
         // The bucket holds no more than it did at first.
         assert_eq!(count(&mut rate, start + Duration::from_secs(1000)), 2000);
     }
@@ -296,7 +315,7 @@ mod tests {
             }
         });
         let start = Instant::now();
-        let mut stream = TimedStream { stream: &server, deadline: start + Duration::from_millis(300) };
+        let mut stream = TimedStream { stream: &server, deadline: start + Duration::from_millis(300), reads_left: 0 };
         // At 2 MB/s at most, this takes more than 30 s; the buffers of the system hold a few megabytes.
         let error = stream.write_all(&vec![0; 64 << 20]).unwrap_err();
         let taken = start.elapsed();
