@@ -1,7 +1,7 @@
 //! MP4 files (ISO/IEC 14496-12, video as in 14496-15): the frames in sequence, then the table of their offsets and
 //! durations. The file is not readable without the table, which is written at the end.
 
-use super::h264::{H264Encoder, ParameterSets, StreamCfg, is_idr};
+use super::h264::{BT709, H264Encoder, ParameterSets, StreamCfg, is_idr};
 use super::{Encoder, Output, duration};
 use crate::writer::{WriteError, WriteResult};
 use std::io::{Seek, SeekFrom, Write};
@@ -20,7 +20,7 @@ struct Mp4 {
 
 /// Writer of a file with coded frames.
 pub(crate) struct Mp4Writer {
-    size: [usize; 2],
+    cfg: StreamCfg,
     /// Units of time per second.
     per_second: u32,
     frames: Vec<Sample>,
@@ -38,8 +38,8 @@ struct Sample {
 }
 
 pub(super) fn begin(size: [usize; 2]) -> Result<Box<dyn Encoder>, String> {
-    let stream = H264Encoder::new(StreamCfg { size, idr_interval: IDR_INTERVAL })?;
-    Ok(Box::new(Mp4 { stream, file: Mp4Writer::new(size, PER_SECOND) }))
+    let cfg = StreamCfg { size, colors: &BT709, idr_interval: IDR_INTERVAL };
+    Ok(Box::new(Mp4 { stream: H264Encoder::new(cfg)?, file: Mp4Writer::new(&cfg, PER_SECOND) }))
 }
 
 /// A box: its length, including the header, its type and its content.
@@ -72,9 +72,9 @@ fn u32s(numbers: &[u32]) -> Vec<u8> {
 const IDENTITY_MATRIX: [u32; 9] = [1 << 16, 0, 0, 0, 1 << 16, 0, 0, 0, 1 << 30];
 
 impl Mp4Writer {
-    /// Begins a file for frames of this width and height, with `per_second` units of time per second.
-    pub(crate) fn new(size: [usize; 2], per_second: u32) -> Self {
-        Self { size, per_second, frames: Vec::new(), length_at: 0, offset: 0 }
+    /// Begins a file for a stream, with `per_second` units of time per second.
+    pub(crate) fn new(cfg: &StreamCfg, per_second: u32) -> Self {
+        Self { cfg: *cfg, per_second, frames: Vec::new(), length_at: 0, offset: 0 }
     }
 
     /// Writes a frame: NAL units of [`H264Encoder::encode`], and the duration in units of time.
@@ -114,7 +114,7 @@ impl Mp4Writer {
         let [upright, next] = [u32s(&IDENTITY_MATRIX), u32s(&[2])];
         let loudness = u32s(&[1 << 16, 1 << 24, 0, 0]);
         let header = full_box(b"mvhd", 1, 0, &[&never, &scale, &length, &loudness, &upright, &[0; 24], &next]);
-        let sides = u32s(&self.size.map(|side| (side as u32) << 16));
+        let sides = u32s(&self.cfg.size.map(|side| (side as u32) << 16));
         // Enabled, in the movie, in its preview; track 1.
         let track = full_box(b"tkhd", 1, 7, &[&never, &u32s(&[1, 0]), &length, &[0; 16], &upright, &sides]);
         // Language `und` (undetermined), five bits per letter.
@@ -154,7 +154,7 @@ impl Mp4Writer {
     /// Sample description.
     fn sample_entry(&self, sets: &ParameterSets) -> Vec<u8> {
         let mut sets = sets.clone();
-        sets.set_level(self.size, self.per_second, self.frames.iter().map(|frame| [frame.duration, frame.bytes]));
+        sets.set_level(self.cfg.size, self.per_second, self.frames.iter().map(|frame| [frame.duration, frame.bytes]));
         let ParameterSets { sequence, image } = &sets;
         let length = |unit: &[u8]| (unit.len() as u16).to_be_bytes();
         // Lengths of units have four bytes; one parameter set of each kind. Profile and level are those of the sequence
@@ -162,10 +162,10 @@ impl Mp4Writer {
         let profile = sequence.get(1..4).unwrap_or_default();
         let avc = [&[1], profile, &[0xff, 0xe1], &length(sequence), sequence, &[1], &length(image), image];
         let avc = make_box(b"avcC", &avc);
-        // The stream has no color description: primaries and matrix of BT.709, transfer function of sRGB, limited
+        // The stream has no color description: primaries of BT.709, transfer function of sRGB, the matrix, limited
         // range.
-        let color = make_box(b"colr", &[b"nclx", &[0, 1, 0, 13, 0, 1, 0]]);
-        let sides = be_bytes(self.size.map(|side| (side as u16).to_be_bytes()));
+        let color = make_box(b"colr", &[b"nclx", &[0, 1, 0, 13, 0, self.cfg.colors.code, 0]]);
+        let sides = be_bytes(self.cfg.size.map(|side| (side as u16).to_be_bytes()));
         let inch = u32s(&[72 << 16, 72 << 16, 0]);
         let head: [&[u8]; 8] = [&[0; 6], &[0, 1], &[0; 16], &sides, &inch, &[0, 1], &[0; 32], &[0, 24, 0xff, 0xff]];
         make_box(b"avc1", &[&head[..], &[&avc, &color]].concat())
