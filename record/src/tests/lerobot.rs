@@ -195,13 +195,13 @@ fn many_episodes() {
 #[ignore = "needs Python readers of recordings: cargo xtask test"]
 fn short_episodes() {
     let (_folder, path) = scratch("run.lerobot");
-    let cart = r#"<mujoco><worldbody><body name="cart"><joint name="x" type="slide" axis="0 1 0"/>
+    let cart = r#"<mujoco><worldbody><body name="cart" pos="0 0 1"><joint name="x" type="slide" axis="0 1 0"/>
         <geom type="box" size="0.2 0.2 0.2" mass="1" rgba="0 1 0 1"/></body></worldbody>
         <actuator><motor joint="x"/></actuator></mujoco>"#;
     let mut sim = simulation(2);
     let cart = sim.add_mjcf(MjcfPartCfg::text("cart", cart)).unwrap();
     let color = Channels { color: true, ..Channels::NONE };
-    let camera = |size| kinetoscope_testkit::worlds::camera(size, [1.0, 0.0, 0.4], [0.0; 3], color);
+    let camera = |size| kinetoscope_testkit::worlds::camera(size, [1.0, 0.0, 1.4], [0.0, 0.0, 1.0], color);
     let eye = sim.add_sensor("camera", camera([48, 32])).unwrap();
     sim.add_sensor("small", camera([16, 20])).unwrap();
     let mut colors = Vec::new();
