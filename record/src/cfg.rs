@@ -49,6 +49,10 @@ pub struct RecorderCfg {
     pub overview: OverviewCfg,
     /// Description of the task in words, for all episodes of a LeRobot dataset. Other formats ignore it.
     pub task: String,
+    /// True to store the cameras of a LeRobot dataset as videos, as LeRobot does by default: H.264 in MP4 files, for images
+    /// of even width and height. False to store PNG images in the Parquet files: exact pixels, any size, and larger files.
+    /// Other formats ignore it.
+    pub use_videos: bool,
     /// True to replace an existing file when the new one is complete, and to replace the partial file of a killed
     /// recording. Without this, an existing file is an error. Folders that are not empty are replaced only if a
     /// recorder wrote them.
@@ -81,6 +85,7 @@ impl Default for RecorderCfg {
             scene: true,
             overview: OverviewCfg::default(),
             task: String::new(),
+            use_videos: true,
             overwrite: false,
         }
     }

@@ -18,9 +18,10 @@ pub enum Format {
     /// Folder of PNG files: color as 8-bit RGB, depth and distance as 16-bit millimeters (0 for a miss, 65535 from
     /// 65.535 m on), and `times.csv` with their times. Other channels are not supported.
     Images,
-    /// LeRobot dataset, version 3.0: a folder of Parquet files, one for each episode. An episode lasts from one reset
-    /// of an environment to the next. Frames are the rows of the recording, from the first complete one on. Their rate
-    /// must be a whole number per second. Requires the feature `lerobot`.
+    /// LeRobot dataset, version 3.0: a folder of Parquet files, one for each episode, and of MP4 videos of the cameras
+    /// ([`RecorderCfg::use_videos`](crate::RecorderCfg::use_videos)). An episode lasts from one reset of an environment
+    /// to the next. Frames are the rows of the recording, from the first complete one on. Their rate must be a whole
+    /// number per second. Requires the feature `lerobot`.
     LeRobot,
     /// Animated GIF of the color of one camera in one environment: 256 colors per frame, times in 1/100 s.
     Gif,

@@ -32,6 +32,7 @@ fn recorder() {
         topics = ["everything", "engine_states", { joint_states = "arm" }, { channel = { sensor = "eye", channel = "rgb" } }]
         envs = [2, 0]
         stream_periods = { camera = 30, "arm/link_poses" = 2 }
+        use_videos = false
         [overview]
         size = [64, 48]
         eye = [1, 2, 3.5]
@@ -46,6 +47,7 @@ fn recorder() {
         ],
         envs: Some(vec![EnvId(2), EnvId(0)]),
         stream_periods: vec![("camera".into(), 30), ("arm/link_poses".into(), 2)],
+        use_videos: false,
         overview: OverviewCfg { size: [64, 48], eye: Some([1.0, 2.0, 3.5]), ..OverviewCfg::default() },
         ..RecorderCfg::new("run.npz")
     };

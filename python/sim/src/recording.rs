@@ -192,7 +192,7 @@ impl Simulation {
     /// Begins a recording; its format follows from the extension of the path. Keyword arguments are the fields of the
     /// Rust ``RecorderCfg``.
     #[pyo3(signature = (path, topics=None, *, format=None, env_ids=None, period_steps=1, stream_periods=None, scene=true,
-        overview_size=None, overview_fps=None, task=None, overwrite=false))]
+        overview_size=None, overview_fps=None, task=None, use_videos=true, overwrite=false))]
     #[expect(clippy::too_many_arguments, reason = "keyword arguments of a Python method")]
     fn record(
         &self,
@@ -207,6 +207,7 @@ impl Simulation {
         overview_size: Option<[usize; 2]>,
         overview_fps: Option<f64>,
         task: Option<String>,
+        use_videos: bool,
         overwrite: bool,
     ) -> PyResult<Recorder> {
         let defaults = RecorderCfg::default();
@@ -220,6 +221,7 @@ impl Simulation {
             scene,
             overview: overview(&defaults.overview, overview_size, overview_fps),
             task: task.unwrap_or_default(),
+            use_videos,
             overwrite,
             ..defaults
         };

@@ -1,10 +1,10 @@
 //! Animations: the images of one camera in one environment as a video file. Each format has one file here, and one
-//! entry in the list of [`Format`].
+//! entry in the list of [`Format`]. Datasets use the H.264 encoder and the writer of MP4 files, too.
 
 mod gif;
-mod h264;
+pub(crate) mod h264;
 mod level;
-mod mp4;
+pub(crate) mod mp4;
 
 use crate::error::{RecordError, Result};
 use crate::file::{PartialFile, Storage};
@@ -16,7 +16,7 @@ use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 
 /// Output of encoders.
-type Output = BufWriter<Box<dyn Storage>>;
+pub(crate) type Output = BufWriter<Box<dyn Storage>>;
 
 /// Encoder of a format.
 trait Encoder: Send {

@@ -1,7 +1,7 @@
 //! MP4 files (ISO/IEC 14496-12, video as in 14496-15): the frames in sequence, then the table of their offsets and
 //! durations. The file is not readable without the table, which is written at the end.
 
-use super::h264::{H264Encoder, ParameterSets};
+use super::h264::{BT709, H264Encoder, ParameterSets, StreamCfg, is_idr};
 use super::{Encoder, Output, duration};
 use crate::writer::{WriteError, WriteResult};
 use std::io::{Seek, SeekFrom, Write};
@@ -9,9 +9,20 @@ use std::io::{Seek, SeekFrom, Write};
 /// Units of time per second: integers for a frame at 24, 25, 30, 50, 60 and 100 Hz.
 const PER_SECOND: u32 = 90_000;
 
+/// Number of frames from one IDR frame to the next.
+const IDR_INTERVAL: u32 = 120;
+
+/// Encoder of an animation.
 struct Mp4 {
-    size: [usize; 2],
     stream: H264Encoder,
+    file: Mp4Writer,
+}
+
+/// Writer of a file with coded frames.
+pub(crate) struct Mp4Writer {
+    cfg: StreamCfg,
+    /// Units of time per second.
+    per_second: u32,
     frames: Vec<Sample>,
     /// File offset of the data length, which is written at the end.
     length_at: u64,
@@ -27,8 +38,8 @@ struct Sample {
 }
 
 pub(super) fn begin(size: [usize; 2]) -> Result<Box<dyn Encoder>, String> {
-    let stream = H264Encoder::new(size)?;
-    Ok(Box::new(Mp4 { size, stream, frames: Vec::new(), length_at: 0, offset: 0 }))
+    let cfg = StreamCfg { size, colors: &BT709, idr_interval: IDR_INTERVAL };
+    Ok(Box::new(Mp4 { stream: H264Encoder::new(cfg)?, file: Mp4Writer::new(&cfg, PER_SECOND) }))
 }
 
 /// A box: its length, including the header, its type and its content.
@@ -60,18 +71,50 @@ fn u32s(numbers: &[u32]) -> Vec<u8> {
 /// The identity matrix in fixed point: no rotation, no scale.
 const IDENTITY_MATRIX: [u32; 9] = [1 << 16, 0, 0, 0, 1 << 16, 0, 0, 0, 1 << 30];
 
-impl Mp4 {
+impl Mp4Writer {
+    /// Begins a file for a stream, with `per_second` units of time per second.
+    pub(crate) fn new(cfg: &StreamCfg, per_second: u32) -> Self {
+        Self { cfg: *cfg, per_second, frames: Vec::new(), length_at: 0, offset: 0 }
+    }
+
+    /// Writes a frame: NAL units of [`H264Encoder::encode`], and the duration in units of time.
+    pub(crate) fn add(&mut self, out: &mut Output, units: &[u8], duration: u32) -> WriteResult {
+        if self.frames.is_empty() {
+            let brands = make_box(b"ftyp", &[b"isom", &u32s(&[0x200]), b"isomiso2avc1mp41"]);
+            out.write_all(&brands)?;
+            // The length has eight bytes and is not known yet.
+            out.write_all(&u32s(&[1]))?;
+            out.write_all(b"mdat\0\0\0\0\0\0\0\0")?;
+            self.length_at = brands.len() as u64 + 8;
+            self.offset = self.length_at + 8;
+        }
+        let too_large = |_| WriteError::limit("a frame of an MP4 file has less than 4 GiB; use smaller images");
+        let bytes = u32::try_from(units.len()).map_err(too_large)?;
+        out.write_all(units)?;
+        self.frames.push(Sample { offset: self.offset, bytes, duration, is_sync: is_idr(units) });
+        self.offset += u64::from(bytes);
+        Ok(())
+    }
+
+    /// Completes the file. `sets` are the parameter sets of the stream.
+    pub(crate) fn finish(&self, out: &mut Output, sets: &ParameterSets) -> WriteResult {
+        out.write_all(&self.movie_box(sets))?;
+        out.seek(SeekFrom::Start(self.length_at))?;
+        // The length includes the header of sixteen bytes.
+        Ok(out.write_all(&(self.offset - self.length_at + 8).to_be_bytes())?)
+    }
+
     /// Movie metadata (8.2).
-    fn movie_box(&self) -> Vec<u8> {
+    fn movie_box(&self, sets: &ParameterSets) -> Vec<u8> {
         let length: u64 = self.frames.iter().map(|frame| u64::from(frame.duration)).sum();
         let length = length.to_be_bytes();
         // Without times of creation and modification, equal recordings give equal files.
         let never = [0; 16];
-        let scale = PER_SECOND.to_be_bytes();
+        let scale = self.per_second.to_be_bytes();
         let [upright, next] = [u32s(&IDENTITY_MATRIX), u32s(&[2])];
         let loudness = u32s(&[1 << 16, 1 << 24, 0, 0]);
         let header = full_box(b"mvhd", 1, 0, &[&never, &scale, &length, &loudness, &upright, &[0; 24], &next]);
-        let sides = u32s(&self.size.map(|side| (side as u32) << 16));
+        let sides = u32s(&self.cfg.size.map(|side| (side as u32) << 16));
         // Enabled, in the movie, in its preview; track 1.
         let track = full_box(b"tkhd", 1, 7, &[&never, &u32s(&[1, 0]), &length, &[0; 16], &upright, &sides]);
         // Language `und` (undetermined), five bits per letter.
@@ -79,13 +122,13 @@ impl Mp4 {
         let handler = full_box(b"hdlr", 0, 0, &[&[0; 4], b"vide", &[0; 12], b"video\0"]);
         let here = full_box(b"dref", 0, 0, &[&u32s(&[1]), &full_box(b"url ", 0, 1, &[])]);
         let video = full_box(b"vmhd", 0, 1, &[&[0; 8]]);
-        let info = make_box(b"minf", &[&video, &make_box(b"dinf", &[&here]), &self.sample_table()]);
+        let info = make_box(b"minf", &[&video, &make_box(b"dinf", &[&here]), &self.sample_table(sets)]);
         let track = make_box(b"trak", &[&track, &make_box(b"mdia", &[&media, &handler, &info])]);
         make_box(b"moov", &[&header, &track])
     }
 
     /// Sample table (8.5).
-    fn sample_table(&self) -> Vec<u8> {
+    fn sample_table(&self, sets: &ParameterSets) -> Vec<u8> {
         let count = |count: usize| u32::try_from(count).unwrap_or(u32::MAX).to_be_bytes();
         let mut shown: Vec<[u32; 2]> = Vec::new();
         for frame in &self.frames {
@@ -104,24 +147,25 @@ impl Mp4 {
         let sizes = full_box(b"stsz", 0, 0, &[&[0; 4], &count(self.frames.len()), &sizes]);
         let places = be_bytes(self.frames.iter().map(|frame| frame.offset.to_be_bytes()));
         let places = full_box(b"co64", 0, 0, &[&count(self.frames.len()), &places]);
-        let kinds = full_box(b"stsd", 0, 0, &[&u32s(&[1]), &self.sample_entry()]);
+        let kinds = full_box(b"stsd", 0, 0, &[&u32s(&[1]), &self.sample_entry(sets)]);
         make_box(b"stbl", &[&kinds, &times, &alone, &chunks, &sizes, &places])
     }
 
     /// Sample description.
-    fn sample_entry(&self) -> Vec<u8> {
-        let frames = self.frames.iter().map(|frame| [frame.duration, frame.bytes]);
-        let ParameterSets { sequence, image } = &self.stream.headers(PER_SECOND, frames);
+    fn sample_entry(&self, sets: &ParameterSets) -> Vec<u8> {
+        let mut sets = sets.clone();
+        sets.set_level(self.cfg.size, self.per_second, self.frames.iter().map(|frame| [frame.duration, frame.bytes]));
+        let ParameterSets { sequence, image } = &sets;
         let length = |unit: &[u8]| (unit.len() as u16).to_be_bytes();
         // Lengths of units have four bytes; one parameter set of each kind. Profile and level are those of the sequence
         // parameter set.
         let profile = sequence.get(1..4).unwrap_or_default();
         let avc = [&[1], profile, &[0xff, 0xe1], &length(sequence), sequence, &[1], &length(image), image];
         let avc = make_box(b"avcC", &avc);
-        // The stream has no color description: primaries and matrix of BT.709, transfer function of sRGB, limited
+        // The stream has no color description: primaries of BT.709, transfer function of sRGB, the matrix, limited
         // range.
-        let color = make_box(b"colr", &[b"nclx", &[0, 1, 0, 13, 0, 1, 0]]);
-        let sides = be_bytes(self.size.map(|side| (side as u16).to_be_bytes()));
+        let color = make_box(b"colr", &[b"nclx", &[0, 1, 0, 13, 0, self.cfg.colors.code, 0]]);
+        let sides = be_bytes(self.cfg.size.map(|side| (side as u16).to_be_bytes()));
         let inch = u32s(&[72 << 16, 72 << 16, 0]);
         let head: [&[u8]; 8] = [&[0; 6], &[0, 1], &[0; 16], &sides, &inch, &[0, 1], &[0; 32], &[0, 24, 0xff, 0xff]];
         make_box(b"avc1", &[&head[..], &[&avc, &color]].concat())
@@ -130,29 +174,11 @@ impl Mp4 {
 
 impl Encoder for Mp4 {
     fn frame(&mut self, out: &mut Output, rgba: &[u8], shown: [f64; 2]) -> WriteResult {
-        if self.frames.is_empty() {
-            let brands = make_box(b"ftyp", &[b"isom", &u32s(&[0x200]), b"isomiso2avc1mp41"]);
-            out.write_all(&brands)?;
-            // The length has eight bytes and is not known yet.
-            out.write_all(&u32s(&[1]))?;
-            out.write_all(b"mdat\0\0\0\0\0\0\0\0")?;
-            self.length_at = brands.len() as u64 + 8;
-            self.offset = self.length_at + 8;
-        }
-        let coded = self.stream.encode(rgba).map_err(WriteError::limit)?;
-        let too_large = |_| WriteError::limit("a frame of an MP4 file has less than 4 GiB; use smaller images");
-        let bytes = u32::try_from(coded.units.len()).map_err(too_large)?;
-        out.write_all(coded.units)?;
-        let duration = duration(shown, PER_SECOND.into(), u32::MAX.into())?;
-        self.frames.push(Sample { offset: self.offset, bytes, duration, is_sync: coded.is_idr });
-        self.offset += u64::from(bytes);
-        Ok(())
+        let units = self.stream.encode(rgba).map_err(WriteError::limit)?;
+        self.file.add(out, units, duration(shown, PER_SECOND.into(), u32::MAX.into())?)
     }
 
     fn finish(&mut self, out: &mut Output) -> WriteResult {
-        out.write_all(&self.movie_box())?;
-        out.seek(SeekFrom::Start(self.length_at))?;
-        // The length includes the header of sixteen bytes.
-        Ok(out.write_all(&(self.offset - self.length_at + 8).to_be_bytes())?)
+        self.file.finish(out, self.stream.parameter_sets())
     }
 }

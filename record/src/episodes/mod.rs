@@ -17,21 +17,21 @@ use crate::writer::{FormatWriter, WriteResult};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-pub(crate) use features::{Features, Role};
+pub(crate) use features::{Features, ImageFeature, Role};
 
 /// Explanation of a recording without any frame.
 pub(crate) const NO_FRAME: &str = "every frame needs a value of each stream and the action that follows";
 
 /// Writer of a dataset. Its environments are numbered by their index in [`environments`].
 pub(crate) trait DatasetWriter: Send {
-    /// An encoded image.
+    /// An image of a camera, as it waits for the frames that contain it.
     type Image: Send + Sync;
 
-    /// Encodes RGBA pixels without their alpha channel; `size` is width and height.
-    fn encode_image(&mut self, rgba: &[u8], size: [usize; 2]) -> WriteResult<Self::Image>;
+    /// Stores RGBA pixels without their alpha channel; `size` is width and height.
+    fn store_image(&mut self, rgba: &[u8], size: [usize; 2]) -> WriteResult<Self::Image>;
 
     /// Begins an episode in an environment, unless one is in progress. A frame follows.
-    fn begin(&mut self, env: usize);
+    fn begin(&mut self, env: usize) -> WriteResult;
 
     /// Adds a frame to the current episode of an environment.
     fn add(&mut self, env: usize, frame: &EpisodeFrame<Self::Image>) -> WriteResult;
@@ -141,7 +141,7 @@ impl<D: DatasetWriter> EpisodeSplitter<D> {
                 continue;
             };
             let rgba = block.values.as_u8s().get(range).unwrap_or_default();
-            images[s] = Some(Arc::new(self.dataset.encode_image(rgba, size)?));
+            images[s] = Some(Arc::new(self.dataset.store_image(rgba, size)?));
         }
         Ok(())
     }
@@ -213,7 +213,7 @@ impl<D: DatasetWriter> EpisodeSplitter<D> {
                 }
             }
             self.envs[k].awaiting_result = Some(frame);
-            self.dataset.begin(k);
+            self.dataset.begin(k)?;
         }
         Ok(())
     }

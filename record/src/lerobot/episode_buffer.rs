@@ -14,7 +14,7 @@ const FLUSH_BYTES: usize = 1 << 20;
 pub(super) struct BufferedFrame {
     /// Values of all features of numbers.
     pub(super) numbers: Vec<f32>,
-    /// Image files.
+    /// Image files, or coded frames of videos.
     pub(super) images: Vec<Vec<u8>>,
     pub(super) reward: f32,
     pub(super) done: bool,

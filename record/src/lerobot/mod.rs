@@ -1,9 +1,11 @@
-//! LeRobot datasets, version 3.0: a folder with a Parquet file for each episode, and metadata.
+//! LeRobot datasets, version 3.0: a folder with a Parquet file for each episode, videos of the cameras, and metadata.
 
 mod episode_buffer;
 mod statistics;
 mod table;
+mod videos;
 
+use crate::animation::h264;
 use crate::cfg::RecorderCfg;
 use crate::episodes::{self, DatasetWriter, EpisodeFrame, EpisodeSplitter, Features, Role};
 use crate::error::{RecordError, Result};
@@ -21,6 +23,7 @@ use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use table::{Column, ColumnType, TableWriter};
+use videos::{EpisodeStream, FILE_LIMITS, VideoWriter};
 
 /// The metadata file that makes a folder a dataset. It is written last.
 const INFO: &str = "meta/info.json";
@@ -55,20 +58,32 @@ struct LeRobotWriter {
     disk: StorageFactory,
     /// The marker file, locked.
     _lock: File,
-    fps: u64,
+    fps: u32,
     task: String,
     features: Arc<Features>,
-    /// Frames of the present episode of each recorded environment; `None` without an episode.
-    open_episodes: Vec<Option<EpisodeBuffer>>,
+    /// Columns of the tables of frames.
+    columns: Vec<(String, ColumnType)>,
+    /// Videos of the cameras, in the order of the image features; empty if their images are in the tables.
+    videos: Vec<VideoWriter>,
+    /// The present episode of each recorded environment; `None` without an episode.
+    open_episodes: Vec<Option<OpenEpisode>>,
     /// Number of frames of each complete episode, in the order of their ends.
     episodes: Vec<u64>,
     statistics: Vec<Statistics>,
     png: PngWriter,
 }
 
-/// An encoded image, with its statistics.
-struct EncodedImage {
-    file: Vec<u8>,
+/// An episode in progress.
+struct OpenEpisode {
+    buffer: EpisodeBuffer,
+    /// Encoders of the videos.
+    streams: Vec<EpisodeStream>,
+}
+
+/// An image, with its statistics.
+struct StoredImage {
+    /// A PNG file; RGBA pixels for a video, in which a frame depends on the frame before it.
+    bytes: Vec<u8>,
     statistics: ImageStatistics,
 }
 
@@ -76,12 +91,13 @@ struct EncodedImage {
 ///
 /// # Errors
 /// The rate of the recording is not a whole number.
-fn frames_per_second(path: &Path, dt: f64, period_steps: u64) -> Result<u64> {
+fn frames_per_second(path: &Path, dt: f64, period_steps: u64) -> Result<u32> {
     let found = 1.0 / (dt * period_steps as f64);
     let whole = found.round();
     // The tolerance is a thousandth of a frame per hour.
     if whole >= 1.0 && (found - whole).abs() < 1e-8 * whole {
-        return Ok(whole as u64);
+        // A time step of physics is at least 1e-9 s.
+        return Ok(whole as u32);
     }
     let fits = |period: &u64| {
         let rate = 1.0 / (dt * *period as f64);
@@ -116,9 +132,12 @@ pub(crate) fn create(
     dt: f64,
     disk: &StorageFactory,
 ) -> Result<Box<dyn FormatWriter>> {
-    let RecorderCfg { path, period_steps, overwrite, task, .. } = cfg;
+    let RecorderCfg { path, period_steps, overwrite, task, use_videos, .. } = cfg;
     let fps = frames_per_second(path, dt, *period_steps)?;
     let features = Arc::new(Features::of(path, Format::LeRobot, streams, name_of)?);
+    if *use_videos {
+        check_videos(path, &features)?;
+    }
     let statistics = features.numbers.iter().map(|feature| Statistics::new(feature.names.len()));
     let statistics = statistics.chain(features.images.iter().map(|_| Statistics::new(3)));
     // Statistics of rewards and ends.
@@ -126,13 +145,18 @@ pub(crate) fn create(
     let statistics = statistics.chain(of_outcome).collect();
     let envs = episodes::environments(path, streams)?;
     let (folder, lock) = PartialFolder::create(path, *overwrite, MARKER)?;
+    let images = features.images.iter().filter(|_| *use_videos);
+    let videos: Vec<VideoWriter> =
+        images.map(|image| VideoWriter::new(image, fps, folder.partial_path(), FILE_LIMITS)).collect();
     let dataset = LeRobotWriter {
         folder,
         disk: disk.clone(),
         _lock: lock,
         fps,
         task: task.clone(),
+        columns: columns(&features, videos.is_empty()),
         features: Arc::clone(&features),
+        videos,
         open_episodes: envs.iter().map(|_| None).collect(),
         episodes: Vec::new(),
         statistics,
@@ -141,11 +165,32 @@ pub(crate) fn create(
     Ok(Box::new(EpisodeSplitter::new(dataset, features, *period_steps, &envs, streams)))
 }
 
-/// Columns of a frame.
-fn columns(features: &Features) -> Vec<(String, ColumnType)> {
+/// Checks that videos can have the images of all cameras.
+///
+/// # Errors
+/// A width or height is odd or too large.
+fn check_videos(path: &Path, features: &Features) -> Result<()> {
+    for image in &features.images {
+        let [width, height] = image.size;
+        h264::check_size(image.size).map_err(|sizes| RecordError::UnsupportedSize {
+            path: path.into(),
+            format: Format::LeRobot,
+            width,
+            height,
+            supported: format!(
+                "{}: in a video, {sizes}; change the size of the camera, or set `use_videos` to false for PNG images",
+                image.name
+            ),
+        })?;
+    }
+    Ok(())
+}
+
+/// Columns of a frame; `has_images` is true if they include images.
+fn columns(features: &Features, has_images: bool) -> Vec<(String, ColumnType)> {
     let numbers =
         features.numbers.iter().map(|feature| (feature.name.clone(), ColumnType::Float32(feature.names.len())));
-    let images = features.images.iter().map(|image| (image.name.clone(), ColumnType::Image));
+    let images = features.images.iter().filter(|_| has_images).map(|image| (image.name.clone(), ColumnType::Image));
     let outcome = [(REWARD, ColumnType::Float32(1)), (DONE, ColumnType::Bool)];
     let outcome =
         outcome.into_iter().filter(|_| features.result_stream.is_some()).map(|(name, kind)| (name.to_string(), kind));
@@ -155,15 +200,20 @@ fn columns(features: &Features) -> Vec<(String, ColumnType)> {
     numbers.chain(images).chain(outcome).chain(common).collect()
 }
 
-/// Features, as described in `meta/info.json`.
-fn feature_info(features: &Features) -> Map<String, Value> {
+/// Features, as described in `meta/info.json`; `fps` is the frame rate of videos, `None` without videos.
+fn feature_info(features: &Features, fps: Option<u32>) -> Map<String, Value> {
     let numbers = features.numbers.iter().map(|feature| {
         let names = &feature.names;
         (feature.name.clone(), json!({ "dtype": "float32", "shape": [names.len()], "names": names }))
     });
     let images = features.images.iter().map(|image| {
         let (names, [width, height]) = (["height", "width", "channels"], image.size);
-        (image.name.clone(), json!({ "dtype": "image", "shape": [height, width, 3], "names": names }))
+        let mut about = json!({ "dtype": "image", "shape": [height, width, 3], "names": names });
+        if let Some(fps) = fps {
+            about["dtype"] = "video".into();
+            about["info"] = videos::info(image.size, fps);
+        }
+        (image.name.clone(), about)
     });
     let outcome = [(REWARD, "float32"), (DONE, "bool")].into_iter().filter(|_| features.result_stream.is_some());
     let outcome = outcome.map(|(name, kind)| (name.to_string(), json!({ "dtype": kind, "shape": [1], "names": null })));
@@ -171,20 +221,24 @@ fn feature_info(features: &Features) -> Map<String, Value> {
 }
 
 impl DatasetWriter for LeRobotWriter {
-    type Image = EncodedImage;
+    type Image = StoredImage;
 
-    fn encode_image(&mut self, rgba: &[u8], size: [usize; 2]) -> WriteResult<EncodedImage> {
-        Ok(EncodedImage { file: self.png.encode_rgb(rgba, size)?.to_vec(), statistics: ImageStatistics::new(rgba) })
+    fn store_image(&mut self, rgba: &[u8], size: [usize; 2]) -> WriteResult<StoredImage> {
+        let pixels = if self.videos.is_empty() { self.png.encode_rgb(rgba, size)? } else { rgba };
+        Ok(StoredImage { bytes: pixels.to_vec(), statistics: ImageStatistics::new(rgba) })
     }
 
-    fn begin(&mut self, env: usize) {
+    fn begin(&mut self, env: usize) -> WriteResult {
         if self.open_episodes[env].is_none() {
             let path = self.folder.partial_path().join(format!("{BUFFERS}/env_{env}"));
-            self.open_episodes[env] = Some(EpisodeBuffer::new(path));
+            let streams = self.features.images.iter().filter(|_| !self.videos.is_empty());
+            let streams = streams.map(|image| EpisodeStream::new(image.size)).collect::<WriteResult<_>>()?;
+            self.open_episodes[env] = Some(OpenEpisode { buffer: EpisodeBuffer::new(path), streams });
         }
+        Ok(())
     }
 
-    fn add(&mut self, env: usize, frame: &EpisodeFrame<EncodedImage>) -> WriteResult {
+    fn add(&mut self, env: usize, frame: &EpisodeFrame<StoredImage>) -> WriteResult {
         let EpisodeFrame { numbers, images, reward, done } = frame;
         let numbers: Vec<Vec<f32>> = numbers.iter().map(|of| of.iter().map(|x| *x as f32).collect()).collect();
         let mut statistics = self.statistics.iter_mut();
@@ -192,23 +246,33 @@ impl DatasetWriter for LeRobotWriter {
         images.iter().zip(&mut statistics).for_each(|(image, statistics)| statistics.add_image(&image.statistics));
         let results = [*reward as f32, f32::from(u8::from(*done))];
         statistics.zip(results).for_each(|(statistics, value)| statistics.add(&[value]));
-        let Some(buffer) = &mut self.open_episodes[env] else { return Ok(()) };
-        let images = images.iter().map(|image| image.file.clone()).collect();
+        let Some(OpenEpisode { buffer, streams }) = &mut self.open_episodes[env] else { return Ok(()) };
+        let images = match streams.is_empty() {
+            true => images.iter().map(|image| image.bytes.clone()).collect(),
+            false => {
+                let pairs = streams.iter_mut().zip(images);
+                pairs.map(|(stream, image)| stream.encode(&image.bytes)).collect::<WriteResult<_>>()?
+            }
+        };
         let frame = BufferedFrame { numbers: numbers.concat(), images, reward: *reward as f32, done: *done };
         Ok(buffer.push(&frame, &self.disk)?)
     }
 
-    /// Writes the Parquet file of the open episode of `env`, if any; `env` counts the recorded environments.
+    /// Writes the Parquet file of the open episode of `env`, if any, and appends its frames to the videos; `env` counts
+    /// the recorded environments.
     fn end(&mut self, env: usize) -> WriteResult {
-        let Some(buffer) = self.open_episodes[env].take() else { return Ok(()) };
+        let Some(OpenEpisode { buffer, streams }) = self.open_episodes[env].take() else { return Ok(()) };
         let (episode, first) = (self.episodes.len() as u64, self.episodes.iter().sum());
         let frames = buffer.frames();
         let file = self.file(&data_file(episode))?;
-        let mut table = TableWriter::create(file, &columns(&self.features), &[])?;
+        let mut table = TableWriter::create(file, &self.columns, &[])?;
         let values = self.features.numbers.iter().map(|feature| feature.names.len()).sum();
         let images = self.features.images.len();
-        let mut group = RowGroup::new(&self.features, self.fps, episode, first);
+        let mut group = RowGroup::new(&self.features, &self.columns, self.fps, episode, first);
+        let videos = &mut self.videos;
+        videos.iter_mut().zip(&streams).try_for_each(|(video, stream)| video.begin(frames, stream, &self.disk))?;
         buffer.drain(values, images, &self.disk, |frame| {
+            videos.iter_mut().zip(&frame.images).try_for_each(|(video, units)| video.add(units))?;
             group.push(frame);
             if group.is_full() { table.write(&group.take_columns()) } else { Ok(()) }
         })?;
@@ -229,6 +293,7 @@ impl DatasetWriter for LeRobotWriter {
             Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(error.into()),
             _ => {}
         }
+        self.videos.iter_mut().try_for_each(VideoWriter::finish)?;
         self.write_tasks()?;
         self.write_episodes()?;
         let mut out = BufWriter::new(self.file("meta/stats.json")?);
@@ -297,12 +362,26 @@ impl LeRobotWriter {
         let mut first = 0;
         for (number, frames) in (0_u64..).zip(&self.episodes) {
             let last = first + frames;
-            let row = [number, *frames, number / FILES_PER_CHUNK, number % FILES_PER_CHUNK, first, last, 0, 0];
+            let [chunk, file] = chunk_and_file(number);
+            let row = [number, *frames, chunk, file, first, last, 0, 0];
             values.iter_mut().zip(row).for_each(|(to, number)| to.push(number as i64));
             first = last;
         }
         let mut values: Vec<Column> = values.into_iter().map(Column::Int64).collect();
         values.push(Column::String(vec![self.task.as_str().into(); self.episodes.len()]));
+        for video in &self.videos {
+            let files =
+                [0, 1].map(|k| video.episodes.iter().map(|range| chunk_and_file(range.file)[k] as i64).collect());
+            let times = [0, 1].map(|k| video.episodes.iter().map(|range| video.time(range.frames[k])).collect());
+            for (name, values_of) in ["chunk_index", "file_index"].into_iter().zip(files) {
+                columns.push((format!("videos/{}/{name}", video.name), ColumnType::Int64));
+                values.push(Column::Int64(values_of));
+            }
+            for (name, values_of) in ["from_timestamp", "to_timestamp"].into_iter().zip(times) {
+                columns.push((format!("videos/{}/{name}", video.name), ColumnType::Float64));
+                values.push(Column::Float64(values_of));
+            }
+        }
         let mut table = TableWriter::create(self.file("meta/episodes/chunk-000/file-000.parquet")?, &columns, &[])?;
         table.write(&values)?;
         table.finish()
@@ -310,7 +389,8 @@ impl LeRobotWriter {
 
     fn info(&self) -> Value {
         let (episodes, frames) = (self.episodes.len(), self.episodes.iter().sum::<u64>());
-        let mut features = feature_info(&self.features);
+        let has_videos = !self.videos.is_empty();
+        let mut features = feature_info(&self.features, has_videos.then_some(self.fps));
         for (name, kind) in COMMON {
             features.insert(name.into(), json!({ "dtype": kind, "shape": [1], "names": null }));
         }
@@ -322,24 +402,31 @@ impl LeRobotWriter {
             "total_tasks": 1,
             "chunks_size": FILES_PER_CHUNK,
             "data_files_size_in_mb": 100,
-            "video_files_size_in_mb": 200,
+            "video_files_size_in_mb": FILE_LIMITS.mib,
             "fps": self.fps,
             "splits": { "train": format!("0:{episodes}") },
             "data_path": "data/chunk-{chunk_index:03d}/file-{file_index:03d}.parquet",
-            "video_path": null,
+            "video_path": has_videos.then_some("videos/{video_key}/chunk-{chunk_index:03d}/file-{file_index:03d}.mp4"),
             "features": features,
         })
     }
 }
 
 fn data_file(episode: u64) -> String {
-    format!("data/chunk-{:03}/file-{:03}.parquet", episode / FILES_PER_CHUNK, episode % FILES_PER_CHUNK)
+    let [chunk, file] = chunk_and_file(episode);
+    format!("data/chunk-{chunk:03}/file-{file:03}.parquet")
+}
+
+/// Number of the folder of a file, and its number in the folder.
+fn chunk_and_file(file: u64) -> [u64; 2] {
+    [file / FILES_PER_CHUNK, file % FILES_PER_CHUNK]
 }
 
 /// Columns of the frames of an episode that are written next.
 struct RowGroup<'a> {
     features: &'a Features,
-    fps: u64,
+    column_types: &'a [(String, ColumnType)],
+    fps: u32,
     episode: u64,
     /// Index of the next frame in the episode.
     frame: u64,
@@ -352,9 +439,15 @@ struct RowGroup<'a> {
 
 impl<'a> RowGroup<'a> {
     /// Begins an episode of this number, whose first frame has the index `first` in the dataset.
-    fn new(features: &'a Features, fps: u64, episode: u64, first: u64) -> Self {
-        let columns = empty_columns(features);
-        Self { features, fps, episode, frame: 0, index: first, rows: 0, image_bytes: 0, columns }
+    fn new(
+        features: &'a Features,
+        column_types: &'a [(String, ColumnType)],
+        fps: u32,
+        episode: u64,
+        first: u64,
+    ) -> Self {
+        let columns = empty_columns(column_types);
+        Self { features, column_types, fps, episode, frame: 0, index: first, rows: 0, image_bytes: 0, columns }
     }
 
     fn push(&mut self, frame: BufferedFrame) {
@@ -363,7 +456,7 @@ impl<'a> RowGroup<'a> {
             *first = range.end;
             frame.numbers.get(range)
         });
-        let time = (self.frame as f64 / self.fps as f64) as f32;
+        let time = (self.frame as f64 / f64::from(self.fps)) as f32;
         // Timestamp after reward; task 0 last.
         let mut floats = self.features.result_stream.map(|_| frame.reward).into_iter().chain([time]);
         let mut integers = [self.frame, self.episode, self.index, 0].into_iter();
@@ -383,7 +476,7 @@ impl<'a> RowGroup<'a> {
                 }
                 Column::Bool(values) => values.push(frame.done),
                 Column::Int64(values) => values.extend(integers.next().map(|number| number as i64)),
-                Column::String(_) => {}
+                Column::String(_) | Column::Float64(_) => {}
             }
         }
         self.frame += 1;
@@ -397,19 +490,20 @@ impl<'a> RowGroup<'a> {
 
     fn take_columns(&mut self) -> Vec<Column> {
         (self.rows, self.image_bytes) = (0, 0);
-        std::mem::replace(&mut self.columns, empty_columns(self.features))
+        std::mem::replace(&mut self.columns, empty_columns(self.column_types))
     }
 }
 
-fn empty_columns(features: &Features) -> Vec<Column> {
-    let empty = |(_, kind): (String, ColumnType)| match kind {
+fn empty_columns(columns: &[(String, ColumnType)]) -> Vec<Column> {
+    let empty = |(_, kind): &(String, ColumnType)| match kind {
         ColumnType::Int64 => Column::Int64(Vec::new()),
         ColumnType::Bool => Column::Bool(Vec::new()),
+        ColumnType::Float64 => Column::Float64(Vec::new()),
         ColumnType::Float32(_) => Column::Float32(Vec::new()),
         ColumnType::String | ColumnType::StringList => Column::String(Vec::new()),
         ColumnType::Image => Column::Image(Vec::new(), Vec::new()),
     };
-    columns(features).into_iter().map(empty).collect()
+    columns.iter().map(empty).collect()
 }
 
 /// Size of all files of a folder \[bytes\].

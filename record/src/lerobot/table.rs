@@ -4,7 +4,7 @@
 use crate::file::Storage;
 use crate::writer::{WriteError, WriteResult};
 use parquet::basic::{ConvertedType, Repetition, Type as PhysicalType};
-use parquet::data_type::{BoolType, ByteArray, ByteArrayType, DataType, FloatType, Int64Type};
+use parquet::data_type::{BoolType, ByteArray, ByteArrayType, DataType, DoubleType, FloatType, Int64Type};
 use parquet::errors::ParquetError;
 use parquet::file::metadata::KeyValue;
 use parquet::file::properties::{EnabledStatistics, WriterProperties};
@@ -20,6 +20,8 @@ pub(super) enum ColumnType {
     Int64,
     /// Boolean.
     Bool,
+    /// A double-precision float.
+    Float64,
     /// This number of floats; one alone is no list.
     Float32(usize),
     /// A string.
@@ -35,6 +37,7 @@ pub(super) enum ColumnType {
 pub(super) enum Column {
     Int64(Vec<i64>),
     Bool(Vec<bool>),
+    Float64(Vec<f64>),
     Float32(Vec<f32>),
     String(Vec<ByteArray>),
     /// Image files, and their names.
@@ -75,6 +78,7 @@ impl TableWriter {
             match values {
                 Column::Int64(values) => write_values::<Int64Type>(&mut group, values, None)?,
                 Column::Bool(values) => write_values::<BoolType>(&mut group, values, None)?,
+                Column::Float64(values) => write_values::<DoubleType>(&mut group, values, None)?,
                 Column::Float32(values) => write_values::<FloatType>(&mut group, values, kind.list_length())?,
                 Column::String(values) => write_values::<ByteArrayType>(&mut group, values, kind.list_length())?,
                 Column::Image(files, names) => {
@@ -137,6 +141,7 @@ fn field(name: &str, kind: ColumnType) -> Result<TypePtr, ParquetError> {
     match kind {
         ColumnType::Int64 => value(name, PhysicalType::INT64, ConvertedType::NONE),
         ColumnType::Bool => value(name, PhysicalType::BOOLEAN, ConvertedType::NONE),
+        ColumnType::Float64 => value(name, PhysicalType::DOUBLE, ConvertedType::NONE),
         ColumnType::Float32(1) => value(name, PhysicalType::FLOAT, ConvertedType::NONE),
         ColumnType::Float32(_) => list(value("element", PhysicalType::FLOAT, ConvertedType::NONE)?),
         ColumnType::String => value(name, PhysicalType::BYTE_ARRAY, ConvertedType::UTF8),

@@ -41,10 +41,9 @@ fn counts(world: &World, env: usize) -> [u64; 3] {
 
 impl Expected {
     /// Records a run in which environment 1 is reset after a step, and collects what is expected of it.
-    pub(crate) fn record(path: &Path, steps: u32, reset_after: u32) -> (World, Self, RecordingSummary) {
+    pub(crate) fn record(cfgs: &[RecorderCfg], steps: u32, reset_after: u32) -> (World, Self, Vec<RecordingSummary>) {
         let mut world = World::new(2, 2);
-        let cfg = RecorderCfg { task: "wave at the cube".into(), ..RecorderCfg::new(path) };
-        let recorder = world.sim.record(cfg).unwrap();
+        let recorders: Vec<_> = cfgs.iter().map(|cfg| world.sim.record(cfg.clone()).unwrap()).collect();
         let mut all = Self { runs: Vec::new(), last_counts: vec![[0; 3]; 2] };
         (0..2).for_each(|env| all.begin(&world, env));
         for step in 0..steps {
@@ -60,8 +59,8 @@ impl Expected {
                 all.begin(&world, 1);
             }
         }
-        assert!(!path.exists(), "a dataset has its name when it is whole");
-        let recorded = world.sim.finish_recording(recorder).unwrap();
+        assert!(cfgs.iter().all(|cfg| !cfg.path.exists()), "a dataset has its name when it is whole");
+        let recorded = recorders.into_iter().map(|recorder| world.sim.finish_recording(recorder).unwrap()).collect();
         (world, all, recorded)
     }
 

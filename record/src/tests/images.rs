@@ -95,14 +95,18 @@ fn animations() -> impl Iterator<Item = (Format, &'static str)> {
     Format::all().filter(|(format, _)| format.is_animation())
 }
 
+/// Weights of red and blue in the luma of ITU-R BT.709 and of BT.601.
+pub(crate) const BT709: [f64; 2] = [0.2126, 0.0722];
+pub(crate) const BT601: [f64; 2] = [0.299, 0.114];
+
 /// Bound of the mean square error of a plane. H.264 quantizes coefficients of an orthonormal transform, each with an
 /// error below the quantization step of 4 (Parseval: as is the mean square error of the pixels); rounding to 8 bits
 /// adds 0.5.
-const MP4_ERROR: f64 = 4.5 * 4.5;
+pub(crate) const MP4_ERROR: f64 = 4.5 * 4.5;
 
-/// Planes of a frame in Y'CbCr by ITU-R BT.709, 8 bits, limited range, without rounding.
-fn bt709(pixels: &[[u8; 3]], frame: &Value) -> [Vec<f64>; 3] {
-    let luma = |[r, g, b]: [f64; 3]| 0.2126 * r + 0.7152 * g + 0.0722 * b;
+/// Planes of a frame in Y'CbCr, 8 bits, limited range, without rounding.
+pub(crate) fn planes_of(pixels: &[[u8; 3]], frame: &Value, [kr, kb]: [f64; 2]) -> [Vec<f64>; 3] {
+    let luma = |[r, g, b]: [f64; 3]| kr * r + (1.0 - kr - kb) * g + kb * b;
     let scaled = |p: &[u8; 3]| [p[0], p[1], p[2]].map(|x| f64::from(x) / 255.0);
     let width = usize::try_from(frame["size"][0].as_u64().unwrap()).unwrap();
     let mut planes = [pixels.iter().map(|pixel| 16.0 + 219.0 * luma(scaled(pixel))).collect(), Vec::new(), Vec::new()];
@@ -110,13 +114,19 @@ fn bt709(pixels: &[[u8; 3]], frame: &Value) -> [Vec<f64>; 3] {
         let (x, y) = (2 * (k % (width / 2)), 2 * (k / (width / 2)));
         let four = [(0, 0), (0, 1), (1, 0), (1, 1)].map(|(dy, dx)| scaled(&pixels[(y + dy) * width + x + dx]));
         let mean = [0, 1, 2].map(|c| four.iter().map(|p| p[c]).sum::<f64>() / 4.0);
-        planes[1].push(128.0 + 224.0 * (mean[2] - luma(mean)) / 1.8556);
-        planes[2].push(128.0 + 224.0 * (mean[0] - luma(mean)) / 1.5748);
+        planes[1].push(128.0 + 224.0 * (mean[2] - luma(mean)) / (2.0 - 2.0 * kb));
+        planes[2].push(128.0 + 224.0 * (mean[0] - luma(mean)) / (2.0 - 2.0 * kr));
     }
     planes
 }
 
-fn mean_square_error(found: &[u8], wanted: &[f64]) -> f64 {
+/// Bytes of hexadecimal numbers.
+pub(crate) fn hex_bytes(hex: &Value) -> Vec<u8> {
+    let hex = hex.as_str().unwrap();
+    (0..hex.len()).step_by(2).map(|k| u8::from_str_radix(&hex[k..k + 2], 16).unwrap()).collect()
+}
+
+pub(crate) fn mean_square_error(found: &[u8], wanted: &[f64]) -> f64 {
     assert_eq!(found.len(), wanted.len());
     found.iter().zip(wanted).map(|(found, wanted)| (f64::from(*found) - wanted).powi(2)).sum::<f64>()
         / wanted.len() as f64
@@ -124,10 +134,7 @@ fn mean_square_error(found: &[u8], wanted: &[f64]) -> f64 {
 
 /// Checks the pixels of a frame.
 fn check_frame(end: &str, frame: &Value, color: &[u8]) {
-    let bytes = |plane: &str| -> Vec<u8> {
-        let hex = frame[plane].as_str().unwrap();
-        (0..hex.len()).step_by(2).map(|k| u8::from_str_radix(&hex[k..k + 2], 16).unwrap()).collect()
-    };
+    let bytes = |plane: &str| hex_bytes(&frame[plane]);
     let pixels = color.as_chunks::<3>().0;
     match end {
         "gif" => {
@@ -136,7 +143,7 @@ fn check_frame(end: &str, frame: &Value, color: &[u8]) {
             assert_eq!(bytes("rgb"), color, "as many colors as fit into a palette are exact");
         }
         "mp4" => {
-            let (found, wanted) = (["y", "u", "v"].map(bytes), bt709(pixels, frame));
+            let (found, wanted) = (["y", "u", "v"].map(bytes), planes_of(pixels, frame, BT709));
             for (plane, (found, wanted)) in found.iter().zip(&wanted).enumerate() {
                 let error = mean_square_error(found, wanted);
                 assert!(error < MP4_ERROR, "plane {plane}: {error}");
@@ -165,11 +172,8 @@ fn animation_frames() {
         assert_ne!(colors[0], colors[3], "something moves");
         if end == "mp4" {
             // Control: another frame is not within the bound.
-            let wanted = bt709(colors[3].as_chunks::<3>().0, &frames[0]);
-            let hex = frames[0]["y"].as_str().unwrap();
-            let found: Vec<u8> =
-                (0..hex.len()).step_by(2).map(|k| u8::from_str_radix(&hex[k..k + 2], 16).unwrap()).collect();
-            assert!(mean_square_error(&found, &wanted[0]) > MP4_ERROR);
+            let wanted = planes_of(colors[3].as_chunks::<3>().0, &frames[0], BT709);
+            assert!(mean_square_error(&hex_bytes(&frames[0]["y"]), &wanted[0]) > MP4_ERROR);
         }
     }
 }

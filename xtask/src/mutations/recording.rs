@@ -43,8 +43,8 @@ pub(super) const RECORDING: &[Mutation] = &[
         "red and blue of a video exchanged",
         "record/src/animation/h264.rs",
         [
-            "fn chroma([red, green, blue]: [i32; 3]) -> [u8; 2] {",
-            "fn chroma([blue, green, red]: [i32; 3]) -> [u8; 2] {",
+            "fn chroma(&self, sums: [i32; 3]) -> [u8; 2] {",
+            "fn chroma(&self, mut sums: [i32; 3]) -> [u8; 2] { sums.reverse();",
         ],
         &["animation::h264::tests::"],
     ),
