@@ -18,14 +18,18 @@ from kinetoscope.rl.rollout import RolloutShard
 CART = """<mujoco><worldbody><body name="cart"><joint name="slide" type="slide" axis="1 0 0" limited="true" range="-0.3 0.3"/>
 <geom size="0.1" mass="2" contype="0" conaffinity="0"/></body></worldbody></mujoco>"""
 
+CALLS: dict = {}
+"""Calls of the policy in this process, by the file that would end it."""
+
 
 def linear(weights, observations, noise):
-    """A linear policy with noise, which also returns its means. With the file ``weights["kill"]``, one process ends at its
-    fifth call."""
-    linear.calls = getattr(linear, "calls", 0) + 1
-    if linear.calls == 5 and weights.get("kill"):
+    """A linear policy with noise, which also returns its means. While there is a file ``weights["kill"]``, a process that calls
+    the policy for the fifth time removes it and ends."""
+    name = weights.get("kill")
+    CALLS[name] = CALLS.get(name, 0) + 1
+    if name and CALLS[name] == 5:
         try:
-            os.remove(weights["kill"])
+            os.remove(name)
         except FileNotFoundError:
             pass
         else:
@@ -207,15 +211,13 @@ def test_actors_of_ray(cluster, name, tmp_path):
     expected = run([RolloutShard(cfg)], weights, 5)
     rollout = ShardedRollout(cfg, 2)
     for number, fragment in enumerate(expected):
-        is_killed = number in (1, 4)
-        # Ray restarted one of both processes, whose count of calls begins anew.
-        if is_killed:
-            (tmp_path / "kill").touch()
-        given = ray.put({**weights, "kill": str(tmp_path / "kill")}) if is_killed else weights
+        given, kill = weights, tmp_path / str(number)
+        if number in (1, 4):
+            kill.touch()
+            given = ray.put({**weights, "kill": str(kill)})
         references = rollout.collect(given)
-        assert all(isinstance(reference, ray.ObjectRef) for reference in references)
+        assert all(isinstance(reference, ray.ObjectRef) for reference in references) and not kill.exists()
         assert_same(joined(ray.get(references)), fragment)
-        assert not (tmp_path / "kill").exists()
     assert rollout.replacements == 2
     # An error of the policy is raised here, and the shards go on from the fragment before it.
     with pytest.raises(ValueError, match="matmul"):

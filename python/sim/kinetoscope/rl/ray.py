@@ -29,21 +29,26 @@ class ShardActor:
 
     def __init__(self, cfg: RolloutCfg, rank: int, world: int) -> None:
         self._place = (cfg, rank, world)
-        self._shard = RolloutShard(*self._place)
+        self._shard: RolloutShard | None = None
 
-    def is_ready(self) -> bool:
-        """True: the constructor has ended."""
-        return True
+    def prepare(self) -> RolloutShard:
+        """Creates the shard. Ray would report an error in the constructor as a lost actor."""
+        if self._shard is not None:
+            self._shard.close()
+        self._shard = RolloutShard(*self._place)
+        return self._shard
+
+    def check(self) -> None:
+        """Raises the errors of the task."""
+        self.prepare()
 
     def fragment(self, weights: Any, number: int, trail: list[Any]) -> tuple[Fragment, Any, bool]:
-        """Fragment ``number``, the next part of the trail, and True if this process first repeated ``trail``."""
-        is_replaced = self._shard.next_fragment != number
-        if is_replaced:
-            if self._shard.next_fragment:
-                self._shard.close()
-                self._shard = RolloutShard(*self._place)
-            self._shard.replay(ray.get(trail))
-        return *self._shard.fragment(weights), is_replaced
+        """Fragment ``number``, the next part of the trail, and True if the shard was created anew and repeated ``trail``."""
+        shard, is_replaced = self._shard, False
+        if shard is None or shard.next_fragment != number:
+            shard, is_replaced = self.prepare(), True
+            shard.replay(ray.get(trail))
+        return *shard.fragment(weights), is_replaced
 
 
 class ShardedRollout:
@@ -70,11 +75,12 @@ class ShardedRollout:
         cfg.envs_per_shard(self.world)
         options = {"num_cpus": cfg.threads, "max_restarts": max_restarts, "max_task_retries": max_restarts}
         actor = ray.remote(ShardActor).options(**options, **(actor_options or {}))
-        settings = ray.put(cfg)
-        self.actors = [actor.remote(settings, rank, self.world) for rank in range(self.world)]
+        # A restarted actor reads its arguments again, so the reference must stay.
+        self._settings = ray.put(cfg)
+        self.actors = [actor.remote(self._settings, rank, self.world) for rank in range(self.world)]
         self._next_fragment = 0
         self._trails: list[list[ray.ObjectRef[Any]]] = [[] for _ in self.actors]
-        ray.get([actor.is_ready.remote() for actor in self.actors])
+        ray.get([actor.check.remote() for actor in self.actors])
 
     def collect(self, weights: Any) -> list[ray.ObjectRef[Fragment]]:
         """Steps all shards with one set of weights, an object or a reference to one. Returns a reference to the
