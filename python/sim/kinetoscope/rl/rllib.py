@@ -23,6 +23,7 @@ require("kinetoscope.rl.rllib", "torch", "2.0", "torch")
 from ray.rllib.algorithms.algorithm_config import AlgorithmConfig  # noqa: E402
 from ray.rllib.env.env_context import EnvContext  # noqa: E402
 from ray.rllib.env.single_agent_env_runner import SingleAgentEnvRunner  # noqa: E402
+from ray.tune.registry import register_env  # noqa: E402
 
 _Config = TypeVar("_Config", bound=AlgorithmConfig)
 
@@ -59,7 +60,8 @@ def with_task(config: _Config, task: str, num_envs_per_env_runner: int, num_env_
             raise ArgumentError(f"with_task: {name} is {value}; expected at least {least}")
     # Errors of the task surface here, and not in the actors.
     make_env({"task": task, **fields}).close()
-    return config.environment(make_env, env_config={"task": task, **fields}).env_runners(
+    register_env("Kinetoscope", make_env)
+    return config.environment("Kinetoscope", env_config={"task": task, **fields}).env_runners(
         env_runner_cls=ShardEnvRunner,
         num_env_runners=num_env_runners,
         num_envs_per_env_runner=num_envs_per_env_runner,
