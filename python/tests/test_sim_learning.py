@@ -482,7 +482,9 @@ def test_programs_of_the_page(cluster, tmp_path, monkeypatch):
     names = [{} for _ in blocks]
     for block, own in zip(blocks, names, strict=True):
         exec(block, own)  # noqa: S102
+        # Its env runners leave too few CPUs for the actors of the next program.
+        if "algorithm" in own:
+            own["algorithm"].stop()
     assert names[0]["model"].num_timesteps == 2048 and names[3]["rollout"].shape == (64, 100)
     assert [fragment.observations.shape for fragment in names[5]["fragments"]] == [(50, 32, 11)] * 2
-    names[4]["algorithm"].stop()
     names[5]["rollout"].close()

@@ -243,6 +243,8 @@ def test_refusals_of_actors(cluster):
         with pytest.raises(ks.ArgumentError) as error:
             ShardedRollout(cfg, shards)
         assert all(part in str(error.value) for part in parts), error.value
+    with pytest.raises(ks.ArgumentError, match="2 actors with 3 CPUs.*4 CPUs of the cluster"):
+        ShardedRollout(dataclasses.replace(cfg, threads=3), 2)
     # Errors of a task in an actor are raised at construction.
     with pytest.raises(ks.UnknownNameError, match="Balance-v0"):
         ShardedRollout(dataclasses.replace(cfg, task="Kinetoscope/Balanc-v0"), 2)

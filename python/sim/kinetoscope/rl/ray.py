@@ -59,8 +59,8 @@ class ShardedRollout:
     environments, if ``cfg.rows_per_call`` is set.
 
     Ray restarts an actor whose process ends, at most ``max_restarts`` times, and the new process repeats the physics since the
-    last checkpoint: the fragment has the same bits. ``replacements`` counts them. ``actor_options`` are further options of
-    ``ray.remote``; an actor needs ``cfg.threads`` CPUs.
+    last checkpoint: the fragment has the same bits. ``replacements`` counts them. An actor needs ``cfg.threads`` CPUs;
+    ``actor_options`` are other options of ``ray.remote``. The constructor waits until Ray has placed all actors.
     """
 
     def __init__(
@@ -73,8 +73,16 @@ class ShardedRollout:
     ) -> None:
         self.cfg, self.world, self.replacements = cfg, _world(shards), 0
         cfg.envs_per_shard(self.world)
-        options = {"num_cpus": cfg.threads, "max_restarts": max_restarts, "max_task_retries": max_restarts}
-        actor = ray.remote(ShardActor).options(**options, **(actor_options or {}))
+        options = {"num_cpus": cfg.threads, "max_restarts": max_restarts, "max_task_retries": max_restarts, **(actor_options or {})}
+        if not ray.is_initialized():
+            ray.init()
+        needed, found = self.world * options["num_cpus"], ray.cluster_resources().get("CPU", 0)
+        if needed > found:
+            raise ArgumentError(
+                f"ShardedRollout: {self.world} actors with {options['num_cpus']} CPUs each do not fit into the {found:g} CPUs of "
+                'the cluster; use fewer shards or threads, or actor_options={"num_cpus": ..}'
+            )
+        actor = ray.remote(ShardActor).options(**options)
         # A restarted actor reads its arguments again, so the reference must stay.
         self._settings = ray.put(cfg)
         self.actors = [actor.remote(self._settings, rank, self.world) for rank in range(self.world)]

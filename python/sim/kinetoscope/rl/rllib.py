@@ -61,9 +61,11 @@ def with_task(config: _Config, task: str, num_envs_per_env_runner: int, num_env_
     # Errors of the task surface here, and not in the actors.
     make_env({"task": task, **fields}).close()
     register_env("Kinetoscope", make_env)
-    return config.environment("Kinetoscope", env_config={"task": task, **fields}).env_runners(
+    config.environment("Kinetoscope", env_config={"task": task, **fields})
+    config.env_runners(
         env_runner_cls=ShardEnvRunner,
         num_env_runners=num_env_runners,
         num_envs_per_env_runner=num_envs_per_env_runner,
         gym_env_vectorize_mode=gymnasium.VectorizeMode.VECTOR_ENTRY_POINT,
     )
+    return config

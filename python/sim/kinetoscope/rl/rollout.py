@@ -1,7 +1,6 @@
 """Rollouts of one shard of the environments of a task. :mod:`kinetoscope.rl.ray` runs shards in actors of Ray.
 
-The bits of an environment do not depend on the number of shards: simulation, episodes and noise are keyed by the seed and the
-global index of the environment.
+Simulation, episodes and noise are keyed by the seed and the global index of an environment, and not by shards.
 """
 
 from __future__ import annotations
@@ -26,6 +25,7 @@ class RolloutShard:
             raise ArgumentError(f"RolloutShard: rank {rank} of {world}; the rank must be 0 to the number of shards - 1")
         self.cfg, self.next_fragment, self._count = cfg, 0, cfg.envs_per_shard(world)
         self._rank, self._world = rank, world
+        self._observations: Any
         self.envs = self._build()
         self._columns = len(self.envs.task.action_space[0])
         self._begin_episodes({})
@@ -36,12 +36,11 @@ class RolloutShard:
             raise ArgumentError("RolloutShard: an error interrupted the last fragment; replay the trail in a new shard")
         columns: list[tuple[Any, ...]] = []
         ends: list[tuple[int, int, Any]] = []
-        noise = self._noise()
-        number, self.next_fragment = self.next_fragment, -1
+        number, noise, self.next_fragment = self.next_fragment, self._noise(), -1
         for step in range(self.cfg.steps):
             actions, extras = self._act(weights, noise[step])
             observations, rewards, terminated, truncated, infos = self.envs.step(actions)
-            ends += [(step, env, infos["final_obs"][env]) for env in np.flatnonzero(terminated | truncated)]
+            ends += [(step, int(env), infos["final_obs"][env]) for env in np.flatnonzero(terminated | truncated)]
             columns.append((self._observations, actions, rewards, terminated, truncated, extras))
             self._observations = observations
         part: Checkpoint | Array = np.stack([column[1] for column in columns])
@@ -49,12 +48,14 @@ class RolloutShard:
         if self.next_fragment % self.cfg.reset_every == 0:
             running = np.flatnonzero(~(terminated | truncated))
             truncated[running] = True
-            ends += [(self.cfg.steps - 1, env, _map(lambda rows: rows[env], self._observations)) for env in running]
+            ends += [(self.cfg.steps - 1, int(env), _map(lambda rows: rows[env], self._observations)) for env in running]
             part = self._checkpoint()
             self._go_on_from(part)
-        where = np.array([end[:2] for end in ends], np.int64).reshape(-1, 2)
         final = _stack([end[2] for end in ends]) if ends else _map(lambda rows: rows[:0], self._observations)
-        return Fragment(*map(_stack, zip(*columns, strict=True)), self._observations, where, final), part
+        names = ("observations", "actions", "rewards", "terminated", "truncated", "extras")
+        fields = {name: _stack(column) for name, column in zip(names, zip(*columns, strict=True), strict=True)}
+        fields |= {"ends": np.array([end[:2] for end in ends], np.int64).reshape(-1, 2), "final_observations": final}
+        return Fragment(**fields, last_observations=self._observations), part
 
     def replay(self, trail: Sequence[Checkpoint | Array]) -> None:
         """Repeats the physics of an equal shard that was lost. ``trail`` has the parts that its calls of ``fragment`` returned:

@@ -53,7 +53,7 @@ class Sb3VecEnv(VecEnv):
         if any(options):
             raise ArgumentError(f"Sb3VecEnv: reset supports no options, and set_options got {options[0]}")
         observations, _ = self.envs.reset(seed=self._seeds[0])
-        self.reset_infos = [{} for _ in range(self.num_envs)]
+        self.reset_infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
         self._actions = None
         self._reset_seeds()
         return observations
