@@ -111,7 +111,9 @@ fn run_tests(repo: &Repo, ready: &Prepared, python: &Path) -> XtaskResult {
     }
     let mut left_out = Vec::new();
     if !has_learning(python) {
-        println!("note: without the libraries of kinetoscope.rl, their tests are left out; {WANTS_TORCH}=1 installs them");
+        println!(
+            "note: without the libraries of kinetoscope.rl, their tests are left out; {WANTS_TORCH}=1 installs them"
+        );
         left_out.push("not needs_learning");
     }
     let scripts = repo.root.join(SCRIPTS);
