@@ -89,6 +89,14 @@ def test_types_of_the_page_and_the_examples(strict, tmp_path):
     for path in (program, *sorted((PROJECT / "python" / "examples").glob("*.py"))):
         result = run("mypy", "--config-file", strict, str(path))
         assert result.returncode == 0, result.stdout
+    # The blocks of docs/learning.md are programs of their own.
+    blocks = re.findall(r"```python\n(.*?)```", (PROJECT / "docs" / "learning.md").read_text(), re.DOTALL)
+    files = [tmp_path / f"block_{number}.py" for number in range(len(blocks))]
+    for file, block in zip(files, blocks, strict=True):
+        file.write_text(block.replace("(weights, observations, noise):", "(weights: Any, observations: Any, noise: Any) -> Any:"))
+        file.write_text("from typing import Any\n" + file.read_text())
+    result = run("mypy", "--config-file", strict, *map(str, files))
+    assert len(files) == 6 and result.returncode == 0, result.stdout
     # A control: a mistake in a block is found.
     program.write_text(program.read_text().replace("sim.update(500)", "sim.update('500')", 1))
     assert run("mypy", "--config-file", strict, str(program)).returncode == 1
