@@ -196,6 +196,32 @@ def test_a_lost_shard_goes_on_with_the_same_bits(case, lost_after):
         assert_same(one, other)
 
 
+def test_curricula_go_on_after_a_checkpoint():
+    """Levels that no curriculum begins with, as an earlier run reached them; episodes on them go on after a checkpoint."""
+    cfg, weights = CFGS["terrain"]
+    shard = RolloutShard(dataclasses.replace(cfg, steps=1))
+    shard.envs.task.set_curriculum("level", [4, 3, 4, 3])
+    shard.fragment(weights)
+    # At the end of an episode, a curriculum may lead to the row before.
+    part = shard.fragment(weights)[1]
+    assert (part.curricula["level"] >= 2).all()
+    np.testing.assert_array_equal(shard.envs.task.curriculum("level"), part.curricula["level"])
+    # The robots stand on the rows of their levels, 6 m apart.
+    rows = np.round(shard.envs.task.sim["robot"].root_pose[:, 0] / 6) + 2
+    np.testing.assert_array_equal(rows, part.curricula["level"])
+
+
+def test_masses_go_on_after_a_checkpoint():
+    """Random masses that are drawn once, with another seed in the simulation after a checkpoint, stay."""
+    cfg, weights = CFGS["carts"]
+    shard = RolloutShard(cfg)
+    before = shard.envs.task.sim.property("mass", "cart/cart")
+    shard.fragment(weights)
+    assert isinstance(shard.fragment(weights)[1], Checkpoint)
+    np.testing.assert_array_equal(shard.envs.task.sim.property("mass", "cart/cart"), before)
+    assert len(np.unique(before)) == cfg.num_envs
+
+
 @pytest.fixture(scope="module")
 def cluster():
     """Ray on this machine."""
