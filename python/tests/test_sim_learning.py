@@ -183,8 +183,19 @@ def test_groups_of_sb3():
     assert dones.all() and last in envs.observation_space and last["critic"][0] > 0
 
 
+@pytest.fixture
+def one_thread():
+    """One thread of torch: with more, small networks wait for threads that other processes keep from running."""
+    import torch
+
+    before = torch.get_num_threads()
+    torch.set_num_threads(1)
+    yield
+    torch.set_num_threads(before)
+
+
 @pytest.mark.needs_learning
-def test_sb3_learns_to_balance():
+def test_sb3_learns_to_balance(one_thread):
     """The untrained policy falls in about 1 s; the trained one stands at least twice as long."""
     from stable_baselines3 import PPO
     from stable_baselines3.common.vec_env import VecMonitor
@@ -288,7 +299,7 @@ def runner_cfg(steps):
 
 
 @pytest.mark.needs_learning
-def test_rsl_rl_learns(tmp_path):
+def test_rsl_rl_learns(one_thread, tmp_path):
     """The runner itself, on the balancing robot."""
     import torch
     from rsl_rl.runners import OnPolicyRunner
@@ -346,7 +357,7 @@ def test_groups_of_skrl():
 
 
 @pytest.mark.needs_learning
-def test_skrl_trains(tmp_path):
+def test_skrl_trains(one_thread, tmp_path):
     """skrl's trainer and PPO run on the balancing robot."""
     import torch
     from skrl.agents.torch.ppo import PPO, PPO_CFG
@@ -389,7 +400,7 @@ def test_skrl_trains(tmp_path):
         device="cpu",
         cfg=cfg,
     )
-    SequentialTrainer(env=envs, agents=agent, cfg={"timesteps": 48, "headless": True}).train()
+    SequentialTrainer(env=envs, agents=agent, cfg={"timesteps": 48, "headless": True, "close_environment_at_exit": False}).train()
     assert (models["policy"].net.weight != before).any() and models["policy"].net.weight.isfinite().all()
 
 
@@ -470,7 +481,7 @@ def test_rllib_trains(cluster):
 
 
 @pytest.mark.needs_learning
-def test_programs_of_the_page(cluster, tmp_path, monkeypatch):
+def test_programs_of_the_page(cluster, one_thread, tmp_path, monkeypatch):
     """The programs of docs/learning.md, with fewer environments and steps."""
     monkeypatch.chdir(tmp_path)
     blocks = re.findall(r"```python\n(.*?)```", (PROJECT / "docs" / "learning.md").read_text(), re.DOTALL)
