@@ -163,6 +163,9 @@ def test_steps_are_those_of_the_vector_environment():
     # At the checkpoint, all episodes have begun anew.
     assert (first["last_observations/"] == second["observations/"][0]).all()
     assert (observations != second["last_observations/"]).any(axis=1).all()
+    # They are others than those at the beginning, and fragments have noise of their own.
+    assert (first["observations/"][0] != second["last_observations/"]).any(axis=1).all()
+    assert (first["actions/"] - first["extras/mean"] != second["actions/"] - second["extras/mean"]).any(axis=2).all()
     # Means of the policy, in the calls that it was made in.
     means = [rows @ weights["gain"] for rows in first["observations/"][3].reshape(-1, cfg.rows_per_call, 11)]
     np.testing.assert_array_equal(first["extras/mean"][3], np.concatenate(means))
