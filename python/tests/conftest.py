@@ -8,6 +8,7 @@ import pytest
 
 def pytest_configure(config):
     config.addinivalue_line("markers", "needs_seeds: needs the tutorials of EmbodiChain and Orbit in KINETOSCOPE_SEEDS")
+    config.addinivalue_line("markers", "needs_learning: needs torch and the libraries of kinetoscope.rl")
 
 
 @pytest.fixture

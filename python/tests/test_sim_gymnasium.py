@@ -66,8 +66,8 @@ def test_same_as_gymnasiums_vector_environment(autoreset):
     count = 4
     ours = ks.VectorEnv(cart_task(count, autoreset))
     mode = MODES[autoreset]
-    assert ours.metadata["autoreset_mode"] is mode
     judge = SyncVectorEnv([lambda: Env(cart_task(1, "disabled"))] * count, autoreset_mode=mode)
+    assert ours.metadata["autoreset_mode"] is ours.autoreset_mode is judge.autoreset_mode is mode
     assert ours.single_observation_space == judge.single_observation_space
     assert ours.single_action_space == judge.single_action_space
     assert (ours.observation_space, ours.action_space) == (judge.observation_space, judge.action_space)

@@ -21,8 +21,8 @@ const ASSETS: &str = "python/sim/kinetoscope/assets";
 /// Scripts of other simulators that the compatibility layers run; tests that need them are skipped elsewhere.
 const SCRIPTS: &str = "../shared/seeds";
 
-/// Variable that adds torch to the environment of the tests: it is a download of several gigabytes. Without torch, the tests
-/// of tensors are left out by name.
+/// Variable that adds torch and [`LEARNING`] to the environment of the tests: a download of several gigabytes. Without them, the
+/// tests of tensors and of the libraries are left out by name.
 const WANTS_TORCH: &str = "KINETOSCOPE_TORCH";
 
 /// Versions of NumPy with which the package is tested: one that EmbodiChain's `create_sensor` runs on, which calls a method
@@ -30,7 +30,7 @@ const WANTS_TORCH: &str = "KINETOSCOPE_TORCH";
 const NUMPY: [&str; 2] = ["1.26.4", "2.4.6"];
 
 /// Other packages of the tests.
-const PACKAGES: [&str; 7] = [
+const PACKAGES: [&str; 8] = [
     "gymnasium==1.4.0",
     "pytest==9.2.0",
     "scipy==1.17.1",
@@ -38,6 +38,22 @@ const PACKAGES: [&str; 7] = [
     "opencv-python-headless==4.11.0.86",
     "mypy==2.4.1",
     "pillow==13.0.0",
+    "ray==2.60.0",
+];
+
+/// Libraries of `kinetoscope.rl` that need torch. `ray[rllib]` would also pin Gymnasium 1.2.2, so its requirements are listed.
+const LEARNING: [&str; 11] = [
+    "stable-baselines3==2.9.2",
+    "rsl-rl-lib==5.5.1",
+    "skrl==2.1.1",
+    "torchrl==0.14.1",
+    "dm-tree==0.1.10",
+    "lz4==4.4.5",
+    "ormsgpack>=1.7.0",
+    "pandas",
+    "pyarrow>=17.0.0",
+    "pydantic>=2.5.0,<3",
+    "tensorboardX>=1.9",
 ];
 
 /// Builds the wheel and returns its path.
@@ -93,18 +109,32 @@ fn run_tests(repo: &Repo, ready: &Prepared, python: &Path) -> XtaskResult {
         println!("note: without torch, its tests are left out; {WANTS_TORCH}=1 installs it beside NumPy {}", NUMPY[0]);
         tests = tests.env("KINETOSCOPE_TESTS_WITHOUT_TORCH", "1");
     }
+    let mut left_out = Vec::new();
+    if !has_learning(python) {
+        println!(
+            "note: without the libraries of kinetoscope.rl, their tests are left out; {WANTS_TORCH}=1 installs them"
+        );
+        left_out.push("not needs_learning");
+    }
     let scripts = repo.root.join(SCRIPTS);
-    tests = if scripts.is_dir() {
-        tests.env("KINETOSCOPE_SEEDS", scripts)
+    if scripts.is_dir() {
+        tests = tests.env("KINETOSCOPE_SEEDS", scripts);
     } else {
         println!("note: without the scripts of other simulators ({SCRIPTS}), their tests are left out");
-        tests.args(["-m", "not needs_seeds"])
-    };
+        left_out.push("not needs_seeds");
+    }
     tests
+        .args(["-m", &left_out.join(" and ")])
         .current_dir(repo.root.join("python/tests"))
         .env("KINETOSCOPE_CLI", ready.binary("kinetoscope"))
         .env("PYTHONDONTWRITEBYTECODE", "1")
         .run()
+}
+
+/// True if the libraries of [`LEARNING`] are installed.
+fn has_learning(python: &Path) -> bool {
+    let imports = "import ray.rllib, rsl_rl, skrl, stable_baselines3, torchrl";
+    Cmd::new(python).args(["-c", imports]).quiet().succeeds()
 }
 
 /// A Python with the wheels for users, for benchmarks, below the target folder.
@@ -137,7 +167,7 @@ fn environment(repo: &Repo, numpy: &str) -> XtaskResult<PathBuf> {
     let venv = repo.target.join(format!("python-sim-numpy-{numpy}"));
     let python = venv.join("bin/python");
     let check = format!(
-        "import cv2, gymnasium, matplotlib, mypy, numpy, pytest, scipy, PIL; assert numpy.__version__ == '{numpy}'"
+        "import cv2, gymnasium, matplotlib, mypy, numpy, pytest, ray, scipy, PIL; assert numpy.__version__ == '{numpy}'"
     );
     let is_ready = || Cmd::new(&python).args(["-c", &check]).quiet().succeeds();
     if !is_ready() {
@@ -145,8 +175,8 @@ fn environment(repo: &Repo, numpy: &str) -> XtaskResult<PathBuf> {
         create(&venv, &[&[core.as_str(), &format!("numpy=={numpy}")][..], &PACKAGES].concat())?;
     }
     let wants_torch = numpy == NUMPY[0] && env::var_os(WANTS_TORCH).is_some();
-    if wants_torch && !Cmd::new(&python).args(["-c", "import torch"]).quiet().succeeds() {
-        python::pip_install(&python, &["torch==2.15.0"])?;
+    if wants_torch && !has_learning(&python) {
+        python::pip_install(&python, &[&["torch==2.15.0"][..], &LEARNING].concat())?;
     }
     if is_ready() { Ok(python) } else { Err(Failure::new("the packages of the tests cannot be imported")) }
 }

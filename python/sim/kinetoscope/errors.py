@@ -11,6 +11,7 @@ __all__ = [
     "ForkError",
     "InternalError",
     "KinetoscopeError",
+    "MissingPackageError",
     "ModelError",
     "OutOfRangeError",
     "RecordingError",
@@ -79,6 +80,10 @@ class ForeignHandleError(KinetoscopeError, ValueError):
 
 class ForkError(KinetoscopeError, RuntimeError):
     """A simulation that has threads, or was in use during the fork, was used in a forked process."""
+
+
+class MissingPackageError(KinetoscopeError, ImportError):
+    """A package that ``kinetoscope.rl`` needs is missing or too old; the message has the command that installs it."""
 
 
 class InternalError(KinetoscopeError, RuntimeError):

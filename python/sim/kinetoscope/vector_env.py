@@ -33,7 +33,7 @@ class VectorEnv(gymnasium.vector.VectorEnv[Any, Any, _Array]):
     images. Otherwise they are a dict of the groups, with images of shape (num_envs, height, width, components) below
     ``group/image``. Their type is that of the task. Rewards are float64.
 
-    ``metadata["autoreset_mode"]`` is the mode of the task, and ``options={"reset_mask": mask}`` resets chosen
+    ``autoreset_mode``, also in ``metadata``, is the mode of the task, and ``options={"reset_mask": mask}`` resets chosen
     environments. A seed is one number, from which each environment derives its own random numbers.
 
     Infos have ``reward_terms``, the weighted rewards by term, and where episodes end ``end_reason``, the termination
@@ -50,9 +50,9 @@ class VectorEnv(gymnasium.vector.VectorEnv[Any, Any, _Array]):
         self.num_envs = task.num_envs
         self.render_mode = render_mode
         self._render_size = [int(side) for side in render_size]
-        self._mode = _AUTORESET[task.autoreset]
+        self.autoreset_mode = _AUTORESET[task.autoreset]
         self.metadata = {
-            "autoreset_mode": self._mode,
+            "autoreset_mode": self.autoreset_mode,
             "render_modes": list(_RENDER_MODES),
             "render_fps": round(1 / task.step_dt),
         }
@@ -127,7 +127,7 @@ class VectorEnv(gymnasium.vector.VectorEnv[Any, Any, _Array]):
         for episode in more["ended"]:
             ended[episode["env"]], reasons[episode["env"]] = True, episode["reason"]
         about = {"end_reason": reasons, "_end_reason": ended}
-        if self._mode != AutoresetMode.SAME_STEP:
+        if self.autoreset_mode != AutoresetMode.SAME_STEP:
             infos.update(about)
             return
         last = self._observations(more["final_observations"], final=True)
