@@ -7,6 +7,7 @@ import signal
 import numpy as np
 import pytest
 import ray
+from ray.cluster_utils import Cluster
 
 import kinetoscope as ks
 import kinetoscope.envs
@@ -227,18 +228,23 @@ def test_masses_go_on_after_a_checkpoint():
 
 @pytest.fixture(scope="module")
 def cluster():
-    """Ray on this machine."""
-    ray.init(address="local", num_cpus=4, include_dashboard=False, object_store_memory=100 * 2**20, log_to_driver=False)
+    """Ray with two nodes on this machine, with an object store and two CPUs each."""
+    node = {"num_cpus": 2, "object_store_memory": 100 * 2**20}
+    nodes = Cluster(initialize_head=True, head_node_args={**node, "include_dashboard": False})
+    nodes.add_node(**node)
+    ray.init(address=nodes.address, log_to_driver=False)
     yield
     ray.shutdown()
+    nodes.shutdown()
 
 
-@pytest.mark.parametrize("name", ["carts", "balance"])
-def test_actors_of_ray(cluster, name, tmp_path):
-    """Two actors, of which one is killed inside a fragment, before and after a checkpoint."""
+@pytest.mark.parametrize(("name", "world"), [("carts", 2), ("balance", 4)])
+def test_actors_of_ray(cluster, name, world, tmp_path):
+    """Actors, of which one is killed inside a fragment, before and after a checkpoint. Four need the CPUs of both nodes."""
+    assert [node["Resources"]["CPU"] for node in ray.nodes()] == [2, 2]
     cfg, weights = CFGS[name]
     expected = run([RolloutShard(cfg)], weights, 5)
-    rollout = ShardedRollout(cfg, 2)
+    rollout = ShardedRollout(cfg, world)
     for number, fragment in enumerate(expected):
         given, kill = weights, tmp_path / str(number)
         if number in (1, 4):

@@ -116,8 +116,10 @@ class SkrlEnv(Wrapper):
             return None
         if isinstance(space, gymnasium.spaces.Dict):
             values = {name: observations[name] for name in space}
+        elif isinstance(observations, dict):
+            values = observations["critic" if space is self._state_space else "policy"]
         else:
-            values = observations["critic" if space is self._state_space else "policy"] if isinstance(observations, dict) else observations
+            values = observations
         return flatten_tensorized_space(tensorize_space(space, values, device=self.device))
 
 
