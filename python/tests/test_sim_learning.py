@@ -456,6 +456,8 @@ def test_rllib_trains(cluster):
 
     config = with_task(PPOConfig(), BALANCE, num_envs_per_env_runner=4, num_env_runners=2, simulation={"threads": 1})
     config.training(train_batch_size_per_learner=256, minibatch_size=128, num_epochs=1)
+    # A busy machine samples slowly; the default is a minute.
+    config.env_runners(sample_timeout_s=600)
     algorithm = config.build_algo()
     # The reset of an env runner without a seed gives the episodes of its shard.
     starts = algorithm.env_runner_group.foreach_env_runner(
@@ -466,8 +468,6 @@ def test_rllib_trains(cluster):
     np.testing.assert_array_equal(np.concatenate(starts), expected[4:])
     result = algorithm.train()
     assert result["num_env_steps_sampled_lifetime"] >= 256
-    # Episodes of 10 s at 50 Hz, each step within the bounds of the rewards.
-    assert result["env_runners"]["num_env_steps_sampled"] > 0
     algorithm.stop()
     for call, parts in [
         (lambda: with_task(PPOConfig(), "Kinetoscope/Balanc-v0", 4), ["Balanc-v0", "Balance-v0"]),

@@ -26,7 +26,8 @@ const SCRIPTS: &str = "../shared/seeds";
 const WANTS_TORCH: &str = "KINETOSCOPE_TORCH";
 
 /// Versions of NumPy with which the package is tested: one that EmbodiChain's `create_sensor` runs on, which calls a method
-/// that NumPy 2 does not have, and one that `pip` installs beside the package. Torch is tested with the first.
+/// that NumPy 2 does not have, and one that `pip` installs beside the package. Tensors are tested with the first, and the libraries
+/// of `kinetoscope.rl` with the second.
 const NUMPY: [&str; 2] = ["1.26.4", "2.4.6"];
 
 /// Other packages of the tests.
@@ -104,16 +105,16 @@ fn run_tests(repo: &Repo, ready: &Prepared, python: &Path) -> XtaskResult {
     // The requirements of the wheels are those that are installed.
     Cmd::new(python).args(["-m", "pip", "--disable-pip-version-check", "check"]).run()?;
     let mut tests = Cmd::new(python).args(["-m", "pytest", "-q", "-p", "no:cacheprovider", "."]);
-    let has_torch = Cmd::new(python).args(["-c", "import torch"]).quiet().succeeds();
-    if !has_torch {
-        println!("note: without torch, its tests are left out; {WANTS_TORCH}=1 installs it beside NumPy {}", NUMPY[0]);
+    if !is_with_torch(python) {
+        println!(
+            "note: the tests of tensors are left out; {WANTS_TORCH}=1 installs torch beside NumPy {}, for EmbodiChain",
+            NUMPY[0]
+        );
         tests = tests.env("KINETOSCOPE_TESTS_WITHOUT_TORCH", "1");
     }
     let mut left_out = Vec::new();
     if !has_learning(python) {
-        println!(
-            "note: without the libraries of kinetoscope.rl, their tests are left out; {WANTS_TORCH}=1 installs them"
-        );
+        println!("note: the tests of the libraries of kinetoscope.rl are left out; {WANTS_TORCH}=1 installs them");
         left_out.push("not needs_learning");
     }
     let scripts = repo.root.join(SCRIPTS);
@@ -129,6 +130,12 @@ fn run_tests(repo: &Repo, ready: &Prepared, python: &Path) -> XtaskResult {
         .env("KINETOSCOPE_CLI", ready.binary("kinetoscope"))
         .env("PYTHONDONTWRITEBYTECODE", "1")
         .run()
+}
+
+/// True if tensors can be tested: torch is installed, but not beside the libraries of [`LEARNING`], which need a NumPy that
+/// `create_sensor` does not run on.
+fn is_with_torch(python: &Path) -> bool {
+    Cmd::new(python).args(["-c", "import torch"]).quiet().succeeds() && !has_learning(python)
 }
 
 /// True if the libraries of [`LEARNING`] are installed.
@@ -174,9 +181,18 @@ fn environment(repo: &Repo, numpy: &str) -> XtaskResult<PathBuf> {
         let core = format!("mujoco-core=={}", wheel::VERSION);
         create(&venv, &[&[core.as_str(), &format!("numpy=={numpy}")][..], &PACKAGES].concat())?;
     }
-    let wants_torch = numpy == NUMPY[0] && env::var_os(WANTS_TORCH).is_some();
-    if wants_torch && !has_learning(&python) {
-        python::pip_install(&python, &[&["torch==2.15.0"][..], &LEARNING].concat())?;
+    if env::var_os(WANTS_TORCH).is_some() {
+        let torch = ["torch==2.15.0"];
+        let is_first = numpy == NUMPY[0];
+        let pinned = format!("numpy=={numpy}");
+        let packages = if is_first { torch.to_vec() } else { [&torch[..], &LEARNING, &[pinned.as_str()]].concat() };
+        let imports = || if is_first { is_with_torch(&python) } else { has_learning(&python) };
+        if !imports() {
+            python::pip_install(&python, &packages)?;
+        }
+        if !imports() {
+            return Err(Failure::new(format!("{packages:?} cannot be imported")));
+        }
     }
     if is_ready() { Ok(python) } else { Err(Failure::new("the packages of the tests cannot be imported")) }
 }

@@ -82,8 +82,8 @@ def read(root, description, episodes):
         path_of = lambda chunk, file: root / description["video_path"].format(video_key=name, chunk_index=chunk, file_index=file)
         videos = {place(episode): frames(path_of(*place(episode)), description["fps"]) for episode in episodes}
         files |= {path_of(*of) for of in videos}
-        told = {"video.g": 2, **info(path_of(0, 0))}
-        assert features[name]["info"] == told, (features[name], told)
+        expected = {"video.g": 2, **info(path_of(0, 0))}
+        assert features[name]["info"] == expected, (features[name], expected)
         used, output[name] = dict.fromkeys(videos, 0), []
         for episode in episodes:
             video, first = videos[place(episode)], used[place(episode)]

@@ -9,5 +9,10 @@
   one process.
 
 Each module imports its library when it is imported itself, and :class:`kinetoscope.MissingPackageError` names a package that is
-missing or too old, with the command that installs it. The package ``kinetoscope`` requires none of them.
+missing or too old, with the command that installs it. All of them need Gymnasium. The package ``kinetoscope`` requires none of
+these libraries.
 """
+
+from ._requirements import require
+
+require("kinetoscope.rl", "gymnasium", "1.1", "gymnasium")

@@ -21,7 +21,11 @@ def require(owner: str, package: str, oldest: str, module: str) -> None:
         importlib.import_module(module)
     except ImportError as error:
         raise MissingPackageError(f"{owner} needs the package {package}, version {oldest} or later: {command} ({error})") from error
-    found = metadata.version(package.partition("[")[0])
+    try:
+        found = metadata.version(package.partition("[")[0])
+    except metadata.PackageNotFoundError:
+        # A module without an installed package has no version to compare.
+        return
     if _numbers(found) < _numbers(oldest):
         raise MissingPackageError(f"{owner} needs {package} {oldest} or later, and {found} is installed: {command}")
 
@@ -35,7 +39,6 @@ def _numbers(version: str) -> list[int]:
 def vector_env(owner: str, env: VectorEnv | str, num_envs: int | None, autoreset: str, fields: dict[str, Any]) -> VectorEnv:
     """The vector environment ``env``, or that of a task by its registered name, with observations in single precision and
     the mode of automatic resets ``autoreset``."""
-    require(owner, "gymnasium", "1.1", "gymnasium")
     from ..vector_env import VectorEnv
 
     made = env if isinstance(env, VectorEnv) else _registered(owner, env, num_envs, autoreset, fields)

@@ -59,7 +59,8 @@ class ShardedRollout:
     environments, if ``cfg.rows_per_call`` is set.
 
     Ray restarts an actor whose process ends, at most ``max_restarts`` times, and the new process repeats the physics since the
-    last checkpoint: the fragment has the same bits. ``replacements`` counts them. An actor needs ``cfg.threads`` CPUs;
+    last checkpoint: the fragment has the same bits. ``replacements`` counts shards
+    that were created anew, also after an error of the policy. An actor needs ``cfg.threads`` CPUs;
     ``actor_options`` are other options of ``ray.remote``. The constructor waits until Ray has placed all actors.
     """
 

@@ -29,7 +29,8 @@ _Config = TypeVar("_Config", bound=AlgorithmConfig)
 
 
 class ShardEnvRunner(SingleAgentEnvRunner):
-    """An env runner whose environments are the shard of its index, so that no two env runners have the same episodes."""
+    """An env runner whose environments are the shard of its index, so that no two env runners for training
+    have the same episodes."""
 
     def make_env(self) -> None:
         """Creates the environments."""
