@@ -3,6 +3,8 @@
 import dataclasses
 import os
 import signal
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -135,7 +137,9 @@ def case(request):
     cfg, weights = CFGS[request.param]
     whole = RolloutShard(cfg)
     fragments = run([whole], weights, 5)
-    assert sum(len(fragment["ends/"]) for fragment in fragments) > 2 * cfg.num_envs, "episodes end inside fragments, not only at two checkpoints"
+    ends = sum(len(fragment["ends/"]) for fragment in fragments)
+    # All episodes end at the two checkpoints. On the terrain, none ends before in these few steps.
+    assert ends == 2 * cfg.num_envs if request.param == "terrain" else ends > 2 * cfg.num_envs
     return cfg, weights, fragments
 
 
@@ -333,3 +337,16 @@ def cart_of(dtype, autoreset="same_step"):
         "rewards": {"alive": {"type": "is_alive", "weight": 1.0}},
     }
     return ks.Task(sim, cfg, dtype=dtype)
+    # All CPUs are taken, and the constructor waits no longer than it may.
+    first = ShardedRollout(cfg, 4)
+    try:
+        with pytest.raises(ks.ArgumentError, match="in 2 s, Ray has not placed the 2 actors with 1 CPUs each; 0 CPUs"):
+            ShardedRollout(cfg, 2, placement_timeout=2.0)
+    finally:
+        first.close()
+
+
+def test_without_gymnasium():
+    program = "import sys; sys.modules['gymnasium'] = None; import kinetoscope.rl.ray"
+    result = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
+    assert "MissingPackageError: kinetoscope.rl needs the package gymnasium, version 1.1 or later" in result.stderr

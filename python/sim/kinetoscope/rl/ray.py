@@ -61,7 +61,8 @@ class ShardedRollout:
     Ray restarts an actor whose process ends, at most ``max_restarts`` times, and the new process repeats the physics since the
     last checkpoint: the fragment has the same bits. ``replacements`` counts shards
     that were created anew, also after an error of the policy. An actor needs ``cfg.threads`` CPUs;
-    ``actor_options`` are other options of ``ray.remote``. The constructor waits until Ray has placed all actors.
+    ``actor_options`` are other options of ``ray.remote``. The constructor waits until Ray has placed all actors, at most
+    ``placement_timeout`` seconds, because other work can hold the CPUs.
     """
 
     def __init__(
@@ -71,6 +72,7 @@ class ShardedRollout:
         *,
         max_restarts: int = 3,
         actor_options: Mapping[str, Any] | None = None,
+        placement_timeout: float = 600.0,
     ) -> None:
         self.cfg, self.world, self.replacements = cfg, _world(shards), 0
         cfg.envs_per_shard(self.world)
@@ -89,7 +91,15 @@ class ShardedRollout:
         self.actors = [actor.remote(self._settings, rank, self.world) for rank in range(self.world)]
         self._next_fragment = 0
         self._trails: list[list[ray.ObjectRef[Any]]] = [[] for _ in self.actors]
-        ray.get([actor.check.remote() for actor in self.actors])
+        try:
+            ray.get([actor.check.remote() for actor in self.actors], timeout=placement_timeout)
+        except ray.exceptions.GetTimeoutError as error:
+            free = ray.available_resources().get("CPU", 0)
+            self.close()
+            raise ArgumentError(
+                f"ShardedRollout: in {placement_timeout:g} s, Ray has not placed the {self.world} actors with "
+                f"{options['num_cpus']} CPUs each; {free:g} CPUs of the cluster are free"
+            ) from error
 
     def collect(self, weights: Any) -> list[ray.ObjectRef[Fragment]]:
         """Steps all shards with one set of weights, an object or a reference to one. Returns a reference to the
