@@ -177,7 +177,7 @@ impl BuildProfile {
     pub(crate) fn configure(self, repo: &Repo, build: Cmd) -> XtaskResult<Cmd> {
         let build = build.args(["--locked", "--profile", if self == Self::Test { "dev" } else { "release" }]);
         if self == Self::Test {
-            return Ok(build);
+            return Ok(build.args(["--features", "shared"]));
         }
         // Crates that are compiled with these flags are of no use to other builds, so they have a folder of their own.
         let target = repo.target.join("wheel-build");

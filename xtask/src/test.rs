@@ -154,6 +154,55 @@ pub(crate) fn features(packages: &[&str]) -> Vec<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::collections::BTreeSet;
+
+    /// The crates that a command builds, each with its version and features, for the machine that builds and for the
+    /// target. `kinds` are the dependencies that count: those of tests and examples are among them, or not.
+    fn crates(kinds: &str, args: &[&str]) -> BTreeSet<String> {
+        let root = concat!(env!("CARGO_MANIFEST_DIR"), "/..");
+        let tree = ["tree", "--locked", "--offline", "--target", "x86_64-unknown-linux-gnu", "--prefix", "none"];
+        let tree = Cmd::new(env!("CARGO")).args(tree).args(["--format", "{p} [{f}]", "--edges", kinds]).args(args);
+        let lines = tree.current_dir(root).output().expect("cargo knows the crates");
+        let name = |line: &str| {
+            let (package, features) = line.split_once(" [")?;
+            // Without the folder of crates of the workspace, and marks of procedural macros and of repeated lines.
+            let package: Vec<&str> = package.split_whitespace().take(2).collect();
+            Some(format!("{} [{}", package.join(" "), features.trim_end_matches(" (*)")))
+        };
+        String::from_utf8_lossy(&lines).lines().filter_map(name).collect()
+    }
+
+    /// No command compiles a crate with other features than the tests do, but for the packages that it names itself and
+    /// what depends on them.
+    #[test]
+    fn shared_features() {
+        let all = "normal,build,dev";
+        let features = features(&["--workspace"]);
+        let with = |args: &[&'static str]| [args, &features.iter().map(String::as_str).collect::<Vec<_>>()].concat();
+        let tests = crates(all, &with(&["--workspace"]));
+        assert!(tests.len() > 100, "{tests:?}");
+        let four = [&version_dependent_packages()[..], &SHARED_FEATURES].concat();
+        let render = ["--package", "kinetoscope-python-render", "--features", "shared"];
+        let python = ["--package", "kinetoscope-python", "--features", "shared"];
+        let commands: [(&str, &[&str], &[&str]); 6] = [
+            (all, &["--package", "kinetoscope", "--no-default-features"], &["kinetoscope", "kinetoscope-testkit"]),
+            (all, &["--workspace"], &["kinetoscope-cli"]),
+            (
+                all,
+                &with(&["--workspace", "--exclude", "kinetoscope-python", "--exclude", "kinetoscope-python-render"]),
+                &[],
+            ),
+            (all, &four, &["kinetoscope-testkit"]),
+            ("normal,build", &render, &["kinetoscope-python-render", "pyo3", "pyo3-macros"]),
+            ("normal,build", &python, &["kinetoscope", "kinetoscope-python", "pyo3", "pyo3-ffi"]),
+        ];
+        for (kinds, args, own) in commands {
+            let others = crates(kinds, args).into_iter().filter(|line| !tests.contains(line));
+            let others: Vec<String> =
+                others.filter(|line| !own.contains(&line.split(' ').next().unwrap_or_default())).collect();
+            assert_eq!(others, [""; 0], "{args:?}: workspace-hack/Cargo.toml lacks features of the tests");
+        }
+    }
 
     #[test]
     fn whole_workspace() {

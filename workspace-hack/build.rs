@@ -1,0 +1,2 @@
+//! Without a build script, cargo would leave out the build dependencies.
+fn main() {}
