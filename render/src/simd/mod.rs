@@ -2,9 +2,9 @@
 //! that depends on the SIMD library.
 //!
 //! Only operations that IEEE 754 defines to the bit are used (add, subtract, multiply, divide, square root, compare),
-//! and never fused: so every instruction set gives the same image. [`Scalar`] is the reference: plain loops, always
-//! compiled. (The library has a scalar level of its own, but inlining sixteen-wide loops everywhere took over ten
-//! minutes to compile.)
+//! and never fused: so every instruction set gives the same image. [`Scalar`] is the reference: plain loops, for tests and
+//! for machines without vectors. Elsewhere it would take a third of the compile time. (The library has a scalar level of
+//! its own, but inlining sixteen-wide loops everywhere took over ten minutes to compile.)
 
 mod double;
 mod narrow;
@@ -20,6 +20,7 @@ pub(crate) use vector::{D, F, F4, F8, I, M, N, Simd, U};
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum SimdLevel {
     /// Plain loops.
+    #[cfg(any(test, not(any(target_arch = "x86_64", target_arch = "aarch64"))))]
     Scalar,
     /// A level of the SIMD library.
     Simd(BackendLevel),
@@ -29,7 +30,11 @@ impl SimdLevel {
     /// The best level of this machine.
     pub(crate) fn best() -> Self {
         let level = BackendLevel::new();
-        if level.is_fallback() { Self::Scalar } else { Self::Simd(level) }
+        #[cfg(any(test, not(any(target_arch = "x86_64", target_arch = "aarch64"))))]
+        if level.is_fallback() {
+            return Self::Scalar;
+        }
+        Self::Simd(level)
     }
 }
 
@@ -39,6 +44,7 @@ impl SimdLevel {
 macro_rules! at_level {
     ($level:expr, $s:ident => $body:expr) => {
         match $level {
+            #[cfg(any(test, not(any(target_arch = "x86_64", target_arch = "aarch64"))))]
             $crate::simd::SimdLevel::Scalar => {
                 let $s = $crate::simd::Scalar;
                 $body
@@ -54,24 +60,18 @@ macro_rules! at_simd_level {
             $body
         } else if let Some($s) = $level.as_avx2() {
             $body
-        } else if let Some($s) = $level.as_sse2() {
-            $body
         } else {
-            let $s = $crate::simd::Scalar;
+            let $s = $level.as_sse2().expect("a level of the library has SSE2");
             $body
         }
     };
 }
 #[cfg(target_arch = "aarch64")]
 macro_rules! at_simd_level {
-    ($level:ident, $s:ident => $body:expr) => {
-        if let Some($s) = $level.as_neon() {
-            $body
-        } else {
-            let $s = $crate::simd::Scalar;
-            $body
-        }
-    };
+    ($level:ident, $s:ident => $body:expr) => {{
+        let $s = $level.as_neon().expect("a level of the library has NEON");
+        $body
+    }};
 }
 #[cfg(not(any(target_arch = "x86", target_arch = "x86_64", target_arch = "aarch64")))]
 macro_rules! at_simd_level {
