@@ -205,6 +205,7 @@ impl Data {
     ///
     /// # Errors
     /// MuJoCo reported an error (out of memory): reset or drop this data.
+    #[inline]
     pub fn step1(&mut self) -> Result<(), EngineError> {
         let (m, d) = (self.model.raw(), self.raw.as_ptr());
         // SAFETY: model and data are alive and belong together; an engine function (guarded).
@@ -250,6 +251,7 @@ impl Data {
 
     /// Normalizes the quaternions of free and ball joints in `qpos`, as the forward pass of 2.2.2 does. Has no effect
     /// on 4.x, where positions stay as they are.
+    #[inline]
     pub fn normalize_quaternions(&mut self) {
         #[cfg(not(mj4))]
         {
@@ -260,6 +262,7 @@ impl Data {
     }
 
     /// True if `qpos` or `qvel` contains a number that MuJoCo's step rejects: not finite, or above 1e10 in magnitude.
+    #[inline]
     pub fn has_bad_state(&self) -> bool {
         // The comparison is false for NaN. Without an early exit, the loop is vectorized.
         let good = |values: &[f64]| values.iter().fold(true, |good, x| good & (x.abs() <= mj::mjMAXVAL));
@@ -271,6 +274,7 @@ impl Data {
     ///
     /// # Errors
     /// MuJoCo reported an error (out of memory): reset or drop this data.
+    #[inline]
     pub fn step2(&mut self) -> Result<(), EngineError> {
         let (m, d) = (self.model.raw(), self.raw.as_ptr());
         // SAFETY: model and data are alive and belong together; an engine function (guarded).
@@ -390,6 +394,13 @@ impl Data {
         #[cfg(not(mj4))]
         let extra = d.nstack as usize * size_of::<f64>();
         size_of::<mj::mjData>() + d.nbuffer as usize + extra
+    }
+
+    /// True if MuJoCo gave a warning since the last [`take_warnings`](Self::take_warnings) or reset.
+    #[inline]
+    pub fn has_warnings(&self) -> bool {
+        let warnings = &self.header().warning;
+        Warning::ALL.iter().any(|kind| warnings[kind.code()].number > 0)
     }
 
     /// Returns the number of warnings of each type since the last call or reset, and sets MuJoCo's counters to zero.

@@ -31,8 +31,9 @@ use std::ops::Range;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-/// Largest number of environments in a chunk. Within a chunk, the next row is prefetched.
-const MAX_CHUNK_SIZE: usize = 16;
+/// Largest number of environments in a chunk, with several threads and with one. Within a chunk, the next row is
+/// prefetched.
+const MAX_CHUNK_SIZES: [usize; 2] = [16, 64];
 
 /// Consecutive environments that one thread processes together.
 struct Chunk {
@@ -170,8 +171,11 @@ impl Batch {
         if is_limited || available_memory().is_some_and(|available| bytes > available) {
             return Err(BatchError::OutOfMemory { num_envs, bytes });
         }
-        // Many chunks per thread balance environments of unequal cost.
-        let chunk_size = (num_envs / (64 * threads)).clamp(1, MAX_CHUNK_SIZE);
+        let chunk_size = match threads {
+            1 => num_envs.min(MAX_CHUNK_SIZES[1]),
+            // Many chunks per thread balance environments of unequal cost.
+            _ => (num_envs / (64 * threads)).clamp(1, MAX_CHUNK_SIZES[0]),
+        };
         let count = num_envs.div_ceil(chunk_size);
         let mut chunks = Vec::with_capacity(count);
         for first in (0..num_envs).step_by(chunk_size) {

@@ -13,8 +13,8 @@ use crate::row::EnvRow;
 use crate::wrenches::Wrenches;
 use kinetoscope_mujoco as mj;
 use kinetoscope_mujoco::{
-    Buffers, Data, EngineError, IntegrationState, Model, ModelPatch, SolvedState, UnnormalizedQuats, UserInputs,
-    Warning, WarningCounts, Weld,
+    BodyInputs, Buffers, Data, EngineError, IntegrationState, Model, ModelPatch, SolvedState, UnnormalizedQuats,
+    UserInputs, Warning, WarningCounts, Weld,
 };
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::Arc;
@@ -104,6 +104,10 @@ pub struct SimEnv {
     max_bytes: usize,
     /// Version of the row of which `data` still holds everything, or 0; see [`EnvRow::version`].
     held: u64,
+    /// Inputs of bodies that `data` has, bit for bit, while that is known: those of the row. A step does not change them.
+    loaded_inputs: Option<Arc<BodyInputs>>,
+    /// Efforts of the drives in a step, which are kept only if the step succeeds.
+    efforts: Vec<f64>,
     /// Last version that this environment gave to a row. The upper bits differ between the environments of a batch.
     last_version: u64,
 }
@@ -144,6 +148,8 @@ impl SimEnv {
             buffer_growths: Arc::default(),
             max_bytes: step::MAX_ENV_BYTES,
             held: 0,
+            loaded_inputs: None,
+            efforts: Vec::new(),
             last_version: 0,
         };
         let initial = env.current_motion();
@@ -165,6 +171,8 @@ impl SimEnv {
             buffer_growths: Arc::clone(&self.buffer_growths),
             max_bytes: self.max_bytes,
             held: 0,
+            loaded_inputs: None,
+            efforts: Vec::new(),
             last_version: Self::first_version(slot),
         })
     }
@@ -201,7 +209,13 @@ impl SimEnv {
         }
         self.apply_patch();
         let row = &mut *self.row;
-        row.restore_inputs(&mut self.data);
+        row.joint_inputs.restore(&mut self.data);
+        if !self.loaded_inputs.as_ref().is_some_and(|loaded| Arc::ptr_eq(loaded, &row.body_inputs)) {
+            row.body_inputs.restore(&mut self.data);
+            // MuJoCo normalizes the orientations of mocap bodies in place.
+            let is_constant = self.data.mocap_quat().is_empty();
+            self.loaded_inputs = is_constant.then(|| Arc::clone(&row.body_inputs));
+        }
         row.motion.restore(&mut self.data);
         if with_results || self.data.model().has_history() {
             row.solved.restore(&mut self.data);
@@ -242,7 +256,16 @@ impl SimEnv {
     fn save_row(&mut self) {
         self.save_motion();
         self.row.solved.save(&self.data);
-        self.row.save_inputs(&self.data);
+        self.row.joint_inputs.save(&self.data);
+        if self.loaded_inputs.is_none() {
+            self.row.save_body_inputs(&self.data);
+        }
+    }
+
+    /// Notes that the data no longer belongs to the row, and that its inputs may have changed.
+    fn disown(&mut self) {
+        self.held = 0;
+        self.loaded_inputs = None;
     }
 
     /// Sets results of the last solve that the row does not have to zero.
@@ -325,7 +348,7 @@ impl SimEnv {
             self.raw_quats.restore(&mut self.data);
             self.stage = Stage::Raw;
         }
-        self.held = 0;
+        self.disown();
     }
 
     /// Sets the differences of the environment's model from the compiled one. Welds stay.
@@ -388,7 +411,7 @@ impl SimEnv {
 
     /// Sets controls. They are not part of the state, so no forward pass is needed.
     pub(crate) fn set_controls(&mut self, change: impl FnOnce(&mut [f64])) {
-        self.held = 0;
+        self.disown();
         change(self.data.ctrl_mut());
         self.row.save_written(&self.data);
     }
@@ -396,7 +419,7 @@ impl SimEnv {
     /// Changes external wrenches. They are not part of the state, so no forward pass is needed. A wrench in link axes
     /// needs the poses of the current state.
     pub(crate) fn set_wrenches(&mut self, change: impl FnOnce(&mut Wrenches)) {
-        self.held = 0;
+        self.disown();
         let Self { data, row, .. } = self;
         let wrenches = row.wrenches.get_or_insert_default();
         wrenches.clear(data);
@@ -410,9 +433,10 @@ impl SimEnv {
 
     /// Writes the efforts of drives and the wrenches to `data`, for the next `mj_step2`.
     fn apply_inputs(&mut self) {
-        let Self { data, row, .. } = self;
+        let Self { data, row, loaded_inputs, .. } = self;
         row.drives.apply(data);
         if let Some(wrenches) = &row.wrenches {
+            *loaded_inputs = None;
             wrenches.apply(data);
         }
     }
@@ -426,7 +450,7 @@ impl SimEnv {
 
     /// Resets as [`reset`](Self::reset) does, without the forward pass. Returns the model's initial state.
     pub(crate) fn reset_state(&mut self, change: impl FnOnce(&mut Data, &mut DriveState)) -> IntegrationState {
-        self.held = 0;
+        self.disown();
         self.stage = Stage::Raw;
         self.data.reset();
         self.data.take_warnings();
@@ -475,7 +499,7 @@ impl SimEnv {
 
     /// Restores `motion`, which is without a forward pass, and the inputs as of the last write.
     fn restore_motion(&mut self, motion: &IntegrationState) {
-        self.held = 0;
+        self.disown();
         self.row.written.restore(&mut self.data);
         motion.restore(&mut self.data);
         self.stage = Stage::Raw;

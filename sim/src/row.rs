@@ -135,9 +135,8 @@ impl EnvRow {
         }
     }
 
-    /// Saves the inputs of `data` in the row.
-    pub(crate) fn save_inputs(&mut self, data: &Data) {
-        self.joint_inputs.save(data);
+    /// Saves the inputs of bodies of `data` in the row.
+    pub(crate) fn save_body_inputs(&mut self, data: &Data) {
         if !self.body_inputs.matches(data) {
             own(&mut self.body_inputs).save(data);
         }

@@ -2,7 +2,9 @@
 
 use super::*;
 use crate::env::EnvStatus;
+use crate::wrenches::Wrench;
 use kinetoscope_mujoco as mj;
+use nalgebra::{UnitQuaternion, Vector3};
 
 const PENDULUM: &str = r#"<mujoco><worldbody><body><joint name="j" type="hinge" axis="0 1 0"/>
     <geom type="capsule" fromto="0 0 0 1 0 0" size="0.1"/></body></worldbody></mujoco>"#;
@@ -28,10 +30,11 @@ fn bits(env: &SimEnv) -> Vec<u64> {
 }
 
 fn bits_of_data(data: &mj::Data) -> Vec<u64> {
-    let state = [&[data.time()], data.qpos(), data.qvel(), data.act(), data.qacc_warmstart(), data.ctrl()];
+    let inputs = [data.ctrl(), data.xfrc_applied()];
+    let state = [&[data.time()], data.qpos(), data.qvel(), data.act(), data.qacc_warmstart()];
     let solved = [data.qacc(), data.actuator_force(), data.qfrc_actuator(), data.qfrc_constraint()];
     let computed = [data.sensordata(), data.xpos(), data.xquat(), data.cvel(), data.qfrc_bias(), data.efc_pos()];
-    let all = state.into_iter().chain(solved).chain(computed).flatten().map(|x| x.to_bits());
+    let all = inputs.into_iter().chain(state).chain(solved).chain(computed).flatten().map(|x| x.to_bits());
     all.chain([data.contact().len() as u64]).collect()
 }
 
@@ -46,44 +49,65 @@ fn rows_and_persistent_data() {
         data.qvel_mut().iter_mut().enumerate().for_each(|(k, v)| *v = (1.3 * i as f64 + k as f64).sin());
         data.ctrl_mut()[0] = 0.3 * i as f64;
     };
-    let mut alone: Vec<SimEnv> = (0..ENVS).map(|_| SimEnv::new(&model, &Arc::default()).expect("small")).collect();
-    alone.iter_mut().enumerate().for_each(|(i, env)| env.write(|data| start(i, data)));
-    let mut batch = Batch::new(&model, &Arc::default(), ENVS, 2, ThreadPool::new()).expect("small");
-    batch.run(|i, env| env.write(|data| start(i, data)));
-    for (block, count) in [1, 5, 1, 3, 20, 1, 40].into_iter().enumerate() {
-        for (i, env) in alone.iter_mut().enumerate() {
-            env.step(count);
-            if block == 3 && i % 2 == 0 {
-                env.write(|data| data.xfrc_applied_mut()[8] = 0.5);
+    // What happens to an environment after a block of steps. The others keep the inputs of bodies that they share.
+    let change = |block: usize, i: usize, env: &mut SimEnv| match (block, i) {
+        (1, 1 | 4) => env.set_wrenches(|wrenches| {
+            let axes = Some(UnitQuaternion::from_euler_angles(0.3, 0.0, 0.1 * i as f64));
+            let (force, torque) = (Vector3::new(0.0, 0.2, 0.1), Vector3::zeros());
+            wrenches.replace(Wrench { owner: (0, 0), body: 2, axes, force, torque });
+        }),
+        (3, 0 | 2 | 4 | 6) => env.write(|data| data.xfrc_applied_mut()[8] = 0.5),
+        (4, 3) => env.write(|data| data.qvel_mut()[1] = f64::NAN),
+        (5, 4) => env.set_wrenches(|wrenches| wrenches.list.clear()),
+        _ => {}
+    };
+    for threads in [1, 2] {
+        let mut alone: Vec<SimEnv> = (0..ENVS).map(|_| SimEnv::new(&model, &Arc::default()).expect("small")).collect();
+        alone.iter_mut().enumerate().for_each(|(i, env)| env.write(|data| start(i, data)));
+        let mut batch = Batch::new(&model, &Arc::default(), ENVS, threads, ThreadPool::new()).expect("small");
+        batch.run(|i, env| env.write(|data| start(i, data)));
+        for (block, count) in [1, 5, 1, 3, 20, 1, 40].into_iter().enumerate() {
+            for (i, env) in alone.iter_mut().enumerate() {
+                env.step(count);
+                change(block, i, env);
             }
-            if block == 4 && i == 3 {
-                env.write(|data| data.qvel_mut()[1] = f64::NAN);
+            batch.step(count);
+            (0..ENVS).for_each(|i| batch.write(i, |env| change(block, i, env)));
+            for stage in [Stage::State, Stage::Kinematics, Stage::Forward] {
+                batch.for_each_at(stage, |_, _| ());
             }
+            batch.for_each(|i, env| {
+                assert_eq!(bits(env), bits(&alone[i]), "{threads} threads: environment {i} after block {block}");
+                assert_eq!((env.status(), env.warnings()), (alone[i].status(), alone[i].warnings()));
+            });
         }
-        batch.step(count);
-        if block == 3 {
-            (0..ENVS).step_by(2).for_each(|i| batch.write(i, |env| env.write(|d| d.xfrc_applied_mut()[8] = 0.5)));
-        }
-        if block == 4 {
-            batch.write(3, |env| env.write(|data| data.qvel_mut()[1] = f64::NAN));
-        }
-        for stage in [Stage::State, Stage::Kinematics, Stage::Forward] {
-            batch.for_each_at(stage, |_, _| ());
-        }
-        batch.for_each(|i, env| {
-            assert_eq!(bits(env), bits(&alone[i]), "environment {i} after block {block}");
-            assert_eq!((env.status(), env.warnings()), (alone[i].status(), alone[i].warnings()));
-        });
+        assert_eq!(alone.iter().filter(|env| *env.status() != EnvStatus::Running).count(), 1);
+        assert!(alone[0].data().contact().len() >= 4);
+        assert_ne!(bits(&alone[0]), bits(&alone[1]), "environments differ");
+        // Control: the last bit of an input is seen.
+        let mut other = SimEnv::new(&model, &Arc::default()).expect("small");
+        other.write(|data| start(0, data));
+        other.write(|data| data.ctrl_mut()[0] = f64::from_bits(1));
+        other.step(71);
+        assert_ne!(bits(&other), bits(&alone[0]));
     }
-    assert_eq!(alone.iter().filter(|env| *env.status() != EnvStatus::Running).count(), 1);
-    assert!(alone[0].data().contact().len() >= 4);
-    assert_ne!(bits(&alone[0]), bits(&alone[1]), "environments differ");
-    // Control: the last bit of an input is seen.
-    let mut other = SimEnv::new(&model, &Arc::default()).expect("small");
-    other.write(|data| start(0, data));
-    other.write(|data| data.ctrl_mut()[0] = f64::from_bits(1));
-    other.step(71);
-    assert_ne!(bits(&other), bits(&alone[0]));
+}
+
+/// A step ends with the poses of its start: those of its end are computed for reads alone.
+#[test]
+fn no_poses_without_a_read() {
+    let mut batch = pendulums(1, 1);
+    let xquat = |batch: &Batch, stage| {
+        let read = Mutex::new(Vec::new());
+        batch.visit(stage, |_, env| *lock(&read) = env.data().xquat().to_vec());
+        read.into_inner().expect("no panic")
+    };
+    batch.write(0, |env| env.write(|data| data.qvel_mut()[0] = 1.0));
+    batch.step(2);
+    let start_of_step = xquat(&batch, Stage::Kinematics);
+    batch.step(1);
+    assert_eq!(xquat(&batch, Stage::Raw), start_of_step);
+    assert_ne!(xquat(&batch, Stage::Kinematics), start_of_step);
 }
 
 #[test]

@@ -8,7 +8,6 @@ use kinetoscope_mujoco::{
     Data, EngineError, IntegrationState, ObjectKind, Overflow, SolvedState, UserInputs, Warning, WarningCounts,
 };
 use kinetoscope_scene::Contact;
-use std::cell::Cell;
 use std::cmp::Reverse;
 use std::sync::atomic::Ordering;
 
@@ -45,9 +44,9 @@ impl SimEnv {
         if self.row.diverged.is_some() {
             return;
         }
-        let mut efforts = EFFORTS.take();
+        let mut efforts = std::mem::take(&mut self.efforts);
         self.step_from_forward(&mut efforts, capture);
-        EFFORTS.set(efforts);
+        self.efforts = efforts;
     }
 
     fn step_from_forward(&mut self, efforts: &mut Vec<f64>, capture: Option<&CaptureRequest>) {
@@ -58,6 +57,9 @@ impl SimEnv {
         self.held = 0;
         loop {
             let mut done = self.try_step(efforts, capture);
+            if done.is_ok() && !self.data.has_warnings() && !self.data.has_bad_state() {
+                return self.finish_step(efforts);
+            }
             let mut raised = self.data.take_warnings();
             if done.is_ok() && self.data.has_bad_state() {
                 // MuJoCo itself names the fault.
@@ -70,12 +72,7 @@ impl SimEnv {
                         self.report_warnings(&raised);
                         self.row.cold.warnings.add(&raised);
                     }
-                    self.row.drives.finish_step(efforts);
-                    self.row.steps = self.row.steps.saturating_add(1);
-                    self.row.solved_current = false;
-                    self.row.is_forward_counted = false;
-                    self.stage = Stage::Raw;
-                    return;
+                    return self.finish_step(efforts);
                 }
                 StepOutcome::Overflowed(what) => {
                     if let Err(reason) = self.grow_and_restore(what) {
@@ -88,6 +85,15 @@ impl SimEnv {
                 }
             }
         }
+    }
+
+    /// Keeps the results of a successful step.
+    fn finish_step(&mut self, efforts: &[f64]) {
+        self.row.drives.finish_step(efforts);
+        self.row.steps = self.row.steps.saturating_add(1);
+        self.row.solved_current = false;
+        self.row.is_forward_counted = false;
+        self.stage = Stage::Raw;
     }
 
     /// Does one step after a forward pass, and reads the efforts that the drives applied.
@@ -172,7 +178,7 @@ impl SimEnv {
     /// Checks a state as [`accept`](Self::accept) does, written by code in which MuJoCo gave the warnings `raised`. A
     /// warning of divergence rejects the state: MuJoCo may have replaced it by the initial state.
     pub(super) fn accept_after(&mut self, good: &IntegrationState, mut raised: WarningCounts) {
-        self.held = 0;
+        self.disown();
         self.stage = Stage::Raw;
         self.row.is_forward_counted = false;
         self.row.is_pass_impossible = false;
@@ -250,8 +256,12 @@ impl SimEnv {
         self.prepare_pass();
         loop {
             let done = self.data.step1();
-            let raised = self.data.take_warnings();
             self.stage = Stage::Forward;
+            if done.is_ok() && !self.data.has_warnings() {
+                self.row.is_forward_counted = true;
+                return;
+            }
+            let raised = self.data.take_warnings();
             let reason = match classify_step(done, &raised) {
                 StepOutcome::Succeeded => {
                     if !self.row.is_forward_counted {
@@ -373,7 +383,7 @@ impl SimEnv {
         self.row.motion.restore(&mut data);
         (self.data, self.base, self.patched) = (data, base, None);
         self.stage = Stage::Raw;
-        self.held = 0;
+        self.disown();
         self.buffer_growths.fetch_add(1, Ordering::Relaxed);
         let bytes = self.data.bytes();
         tracing::info!(target: "kinetoscope_sim", env = self.row.cold.env, ?what, bytes, "a buffer of MuJoCo was doubled");
@@ -422,12 +432,6 @@ impl SimEnv {
         self.restore_motion(good);
         self.row.is_forward_counted = true;
     }
-}
-
-thread_local! {
-    /// Efforts of the drives in a step, which are kept only if the step succeeds. One list per thread, not per
-    /// environment: a thousand copies would not stay in the cache.
-    static EFFORTS: Cell<Vec<f64>> = const { Cell::new(Vec::new()) };
 }
 
 /// Inputs with which an environment continues in larger buffers.
