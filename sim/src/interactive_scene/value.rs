@@ -69,42 +69,95 @@ fn describe(value: &DeValue<'_>) -> String {
     }
 }
 
+/// A value as serde's visitors take it.
+enum Content<'a> {
+    String(String),
+    Integer(i64),
+    /// Above the largest `i64`.
+    LargeInteger(u64),
+    Float(f64),
+    Boolean(bool),
+    Array(ArrayItems<'a>),
+    Table(TableEntries<'a>),
+}
+
+// The parts that do not depend on the type to read. The other functions are compiled for each of a hundred types, and
+// took a fifth of this crate's code when they contained these parts.
+impl<'a> Value<'a> {
+    fn content(self) -> Result<Content<'a>, ValueError> {
+        let out_of_range = |number: &str| de::Error::custom(format!("the number {number} is out of range"));
+        Ok(match self.0.into_inner() {
+            DeValue::String(text) => Content::String(text.into_owned()),
+            DeValue::Integer(number) => {
+                let (digits, radix) = (number.as_str(), number.radix());
+                match (i64::from_str_radix(digits, radix), u64::from_str_radix(digits, radix)) {
+                    (Ok(number), _) => Content::Integer(number),
+                    (Err(_), Ok(number)) => Content::LargeInteger(number),
+                    (Err(_), Err(_)) => return Err(out_of_range(digits)),
+                }
+            }
+            DeValue::Float(number) => match number.as_str().parse::<f64>() {
+                Ok(x) if x.is_finite() || number.as_str().contains("inf") || x.is_nan() => Content::Float(x),
+                _ => return Err(out_of_range(number.as_str())),
+            },
+            DeValue::Boolean(yes) => Content::Boolean(yes),
+            DeValue::Datetime(when) => {
+                return Err(de::Error::custom(format!("unexpected date `{when}`; scene files have no dates")));
+            }
+            DeValue::Array(array) => Content::Array(ArrayItems(array.into_iter())),
+            DeValue::Table(table) => Content::Table(TableEntries::new(table)),
+        })
+    }
+
+    /// The variant of an enum that the value selects, and the span of its name if the value is a table.
+    fn variant(self, variants: &[&str]) -> Result<(EnumVariant<'a>, Option<Range<usize>>), ValueError> {
+        let wrong = |found: String| Err(de::Error::custom(format!("{found}, expected one of {}", quoted(variants))));
+        match self.0.into_inner() {
+            DeValue::String(name) => Ok((EnumVariant { name: name.into_owned(), content: None }, None)),
+            DeValue::Table(table) => {
+                let names: Vec<String> = table.keys().map(|key| key.get_ref().to_string()).collect();
+                let mut content = table.into_iter();
+                match (content.next(), content.next()) {
+                    (Some((name, content)), None) => {
+                        let at = name.span();
+                        let chosen = EnumVariant { name: name.get_ref().to_string(), content: Some(Value(content)) };
+                        Ok((chosen, Some(at)))
+                    }
+                    (None, _) => wrong("empty table".into()),
+                    _ => wrong(format!("{} keys (`{}`)", names.len(), names.join("`, `"))),
+                }
+            }
+            other => wrong(format!("invalid type: {}", describe(&other))),
+        }
+    }
+
+    fn expect_table(&self, fields: &[&str]) -> Result<(), ValueError> {
+        if matches!(self.0.get_ref(), DeValue::Table(_)) {
+            return Ok(());
+        }
+        let message = format!("invalid type: {}, expected a table of {}", describe(self.0.get_ref()), quoted(fields));
+        Err(ValueError { message, span: Some(self.0.span()) })
+    }
+}
+
 impl<'de> Deserializer<'de> for Value<'de> {
     type Error = ValueError;
 
     fn deserialize_any<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, ValueError> {
         let span = self.0.span();
-        let out_of_range = |number: &str| de::Error::custom(format!("the number {number} is out of range"));
-        let read = match self.0.into_inner() {
-            DeValue::String(text) => visitor.visit_string(text.into_owned()),
-            DeValue::Integer(number) => {
-                let (digits, radix) = (number.as_str(), number.radix());
-                match (i64::from_str_radix(digits, radix), u64::from_str_radix(digits, radix)) {
-                    (Ok(number), _) => visitor.visit_i64(number),
-                    (Err(_), Ok(number)) => visitor.visit_u64(number),
-                    (Err(_), Err(_)) => Err(out_of_range(digits)),
-                }
+        let read = self.content().and_then(|content| match content {
+            Content::String(text) => visitor.visit_string(text),
+            Content::Integer(number) => visitor.visit_i64(number),
+            Content::LargeInteger(number) => visitor.visit_u64(number),
+            Content::Float(number) => visitor.visit_f64(number),
+            Content::Boolean(yes) => visitor.visit_bool(yes),
+            Content::Array(mut items) => {
+                let length = items.0.len();
+                let value = visitor.visit_seq(&mut items)?;
+                items.expect_end(length).map(|()| value)
             }
-            DeValue::Float(number) => match number.as_str().parse::<f64>() {
-                Ok(x) if x.is_finite() || number.as_str().contains("inf") || x.is_nan() => visitor.visit_f64(x),
-                _ => Err(out_of_range(number.as_str())),
-            },
-            DeValue::Boolean(yes) => visitor.visit_bool(yes),
-            DeValue::Datetime(when) => {
-                Err(de::Error::custom(format!("unexpected date `{when}`; scene files have no dates")))
-            }
-            DeValue::Array(array) => {
-                let (length, mut items) = (array.len(), ArrayItems(array.into_iter()));
-                visitor.visit_seq(&mut items).and_then(|value| match items.0.len() {
-                    0 => Ok(value),
-                    rest => {
-                        let expected = format!("an array of length {}", length - rest);
-                        Err(de::Error::invalid_length(length, &expected.as_str()))
-                    }
-                })
-            }
-            DeValue::Table(table) => visitor.visit_map(TableEntries::new(table)),
-        };
+            Content::Table(entries) => visitor.visit_map(entries),
+        });
         read.map_err(|error| error.at(&span))
     }
 
@@ -127,11 +180,8 @@ impl<'de> Deserializer<'de> for Value<'de> {
         fields: &'static [&'static str],
         visitor: V,
     ) -> Result<V::Value, ValueError> {
-        if matches!(self.0.get_ref(), DeValue::Table(_)) {
-            return self.deserialize_any(visitor);
-        }
-        let message = format!("invalid type: {}, expected a table of {}", describe(self.0.get_ref()), quoted(fields));
-        Err(ValueError { message, span: Some(self.0.span()) })
+        self.expect_table(fields)?;
+        self.deserialize_any(visitor)
     }
 
     fn deserialize_enum<V: Visitor<'de>>(
@@ -141,24 +191,10 @@ impl<'de> Deserializer<'de> for Value<'de> {
         visitor: V,
     ) -> Result<V::Value, ValueError> {
         let span = self.0.span();
-        let wrong = |found: String| Err(de::Error::custom(format!("{found}, expected one of {}", quoted(variants))));
-        let read = match self.0.into_inner() {
-            DeValue::String(name) => visitor.visit_enum(EnumVariant { name: &name, content: None }),
-            DeValue::Table(table) => {
-                let names: Vec<String> = table.keys().map(|key| key.get_ref().to_string()).collect();
-                let mut content = table.into_iter();
-                match (content.next(), content.next()) {
-                    (Some((name, content)), None) => {
-                        let at = name.span();
-                        let chosen = EnumVariant { name: name.get_ref(), content: Some(Value(content)) };
-                        visitor.visit_enum(chosen).map_err(|error| error.at(&at))
-                    }
-                    (None, _) => wrong("empty table".into()),
-                    _ => wrong(format!("{} keys (`{}`)", names.len(), names.join("`, `"))),
-                }
-            }
-            other => wrong(format!("invalid type: {}", describe(&other))),
-        };
+        let read = self.variant(variants).and_then(|(chosen, name)| {
+            let read = visitor.visit_enum(chosen);
+            if let Some(name) = name { read.map_err(|error| error.at(&name)) } else { read }
+        });
         read.map_err(|error| error.at(&span))
     }
 
@@ -178,6 +214,19 @@ impl<'de> IntoDeserializer<'de, ValueError> for Value<'de> {
 
 /// Iterator over an array.
 struct ArrayItems<'a>(<DeArray<'a> as IntoIterator>::IntoIter);
+
+impl ArrayItems<'_> {
+    /// Refuses an array of `length` items of which some were not read.
+    fn expect_end(&self, length: usize) -> Result<(), ValueError> {
+        match self.0.len() {
+            0 => Ok(()),
+            rest => {
+                let expected = format!("an array of length {}", length - rest);
+                Err(de::Error::invalid_length(length, &expected.as_str()))
+            }
+        }
+    }
+}
 
 impl<'de> SeqAccess<'de> for ArrayItems<'de> {
     type Error = ValueError;
@@ -221,19 +270,19 @@ impl<'de> MapAccess<'de> for TableEntries<'de> {
 }
 
 /// A variant of an enum: its name and its content.
-struct EnumVariant<'n, 'a> {
-    name: &'n str,
+struct EnumVariant<'a> {
+    name: String,
     content: Option<Value<'a>>,
 }
 
-impl<'de> EnumAccess<'de> for EnumVariant<'_, 'de> {
+impl<'de> EnumAccess<'de> for EnumVariant<'de> {
     type Error = ValueError;
     type Variant = VariantContent<'de>;
 
     fn variant_seed<V: DeserializeSeed<'de>>(self, seed: V) -> Result<(V::Value, VariantContent<'de>), ValueError> {
-        let name: StrDeserializer<'_, ValueError> = self.name.into_deserializer();
-        let content = VariantContent { name: self.name.into(), value: self.content };
-        seed.deserialize(name).map(|variant| (variant, content))
+        let name: StrDeserializer<'_, ValueError> = self.name.as_str().into_deserializer();
+        let variant = seed.deserialize(name)?;
+        Ok((variant, VariantContent { name: self.name, value: self.content }))
     }
 }
 
