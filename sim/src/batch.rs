@@ -408,7 +408,8 @@ impl Batch {
         spare.origin.for_slot(slot).expect("MuJoCo allocated data of this model before")
     }
 
-    /// Reads environment `index`, with a forward pass done.
+    /// Reads environment `index`, with a forward pass done. `read` must not read another environment of the batch: it may
+    /// be in the same chunk, which is locked.
     ///
     /// # Panics
     /// `index` is not smaller than `num_envs`.

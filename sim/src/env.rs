@@ -211,9 +211,10 @@ impl SimEnv {
         let row = &mut *self.row;
         row.joint_inputs.restore(&mut self.data);
         if !self.loaded_inputs.as_ref().is_some_and(|loaded| Arc::ptr_eq(loaded, &row.body_inputs)) {
+            self.loaded_inputs = None;
             row.body_inputs.restore(&mut self.data);
-            // MuJoCo normalizes the orientations of mocap bodies in place.
-            let is_constant = self.data.mocap_quat().is_empty();
+            // MuJoCo normalizes the orientations of mocap bodies in place, and wrenches are written in every step.
+            let is_constant = self.data.mocap_quat().is_empty() && row.wrenches.is_none();
             self.loaded_inputs = is_constant.then(|| Arc::clone(&row.body_inputs));
         }
         row.motion.restore(&mut self.data);
@@ -257,8 +258,12 @@ impl SimEnv {
         self.save_motion();
         self.row.solved.save(&self.data);
         self.row.joint_inputs.save(&self.data);
-        if self.loaded_inputs.is_none() {
-            self.row.save_body_inputs(&self.data);
+        match &self.loaded_inputs {
+            None => self.row.save_body_inputs(&self.data),
+            Some(loaded) => debug_assert!(
+                Arc::ptr_eq(loaded, &self.row.body_inputs) && loaded.matches(&self.data),
+                "inputs of bodies changed without `disown`"
+            ),
         }
     }
 

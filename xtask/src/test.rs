@@ -156,11 +156,10 @@ mod tests {
     use super::*;
     use std::collections::BTreeSet;
 
-    /// The crates that a command builds, each with its version and features, for the machine that builds and for the
-    /// target. `kinds` are the dependencies that count: those of tests and examples are among them, or not.
+    /// The crates that a command builds, each with its version and features. `kinds` are the dependencies that count: those of tests and examples are among them, or not.
     fn crates(kinds: &str, args: &[&str]) -> BTreeSet<String> {
         let root = concat!(env!("CARGO_MANIFEST_DIR"), "/..");
-        let tree = ["tree", "--locked", "--offline", "--target", "x86_64-unknown-linux-gnu", "--prefix", "none"];
+        let tree = ["tree", "--locked", "--offline", "--prefix", "none"];
         let tree = Cmd::new(env!("CARGO")).args(tree).args(["--format", "{p} [{f}]", "--edges", kinds]).args(args);
         let lines = tree.current_dir(root).output().expect("cargo knows the crates");
         let name = |line: &str| {
@@ -172,8 +171,7 @@ mod tests {
         String::from_utf8_lossy(&lines).lines().filter_map(name).collect()
     }
 
-    /// No command compiles a crate with other features than the tests do, but for the packages that it names itself and
-    /// what depends on them.
+    /// These commands compile no crate with other features than the tests do, but for the packages that are named.
     #[test]
     fn shared_features() {
         let all = "normal,build,dev";

@@ -2,8 +2,9 @@
 //! that depends on the SIMD library.
 //!
 //! Only operations that IEEE 754 defines to the bit are used (add, subtract, multiply, divide, square root, compare),
-//! and never fused: so every instruction set gives the same image. [`Scalar`] is the reference: plain loops, for tests and
-//! for machines without vectors. Elsewhere it would take a third of the compile time. (The library has a scalar level of
+//! and never fused: so every instruction set gives the same image. [`Scalar`] is the reference: plain loops. As a
+//! level of the renderer it is compiled for tests, and for targets whose baseline has no known vectors: on x86-64 it would
+//! be a third of the code. (The library has a scalar level of
 //! its own, but inlining sixteen-wide loops everywhere took over ten minutes to compile.)
 
 mod double;
@@ -20,7 +21,7 @@ pub(crate) use vector::{D, F, F4, F8, I, M, N, Simd, U};
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum SimdLevel {
     /// Plain loops.
-    #[cfg(any(test, not(any(target_arch = "x86_64", target_arch = "aarch64"))))]
+    #[cfg(any(test, not(any(target_arch = "x86_64", all(target_arch = "aarch64", target_feature = "neon")))))]
     Scalar,
     /// A level of the SIMD library.
     Simd(BackendLevel),
@@ -30,7 +31,7 @@ impl SimdLevel {
     /// The best level of this machine.
     pub(crate) fn best() -> Self {
         let level = BackendLevel::new();
-        #[cfg(any(test, not(any(target_arch = "x86_64", target_arch = "aarch64"))))]
+        #[cfg(any(test, not(any(target_arch = "x86_64", all(target_arch = "aarch64", target_feature = "neon")))))]
         if level.is_fallback() {
             return Self::Scalar;
         }
@@ -44,7 +45,7 @@ impl SimdLevel {
 macro_rules! at_level {
     ($level:expr, $s:ident => $body:expr) => {
         match $level {
-            #[cfg(any(test, not(any(target_arch = "x86_64", target_arch = "aarch64"))))]
+            #[cfg(any(test, not(any(target_arch = "x86_64", all(target_arch = "aarch64", target_feature = "neon")))))]
             $crate::simd::SimdLevel::Scalar => {
                 let $s = $crate::simd::Scalar;
                 $body
@@ -66,14 +67,14 @@ macro_rules! at_simd_level {
         }
     };
 }
-#[cfg(target_arch = "aarch64")]
+#[cfg(all(target_arch = "aarch64", target_feature = "neon"))]
 macro_rules! at_simd_level {
     ($level:ident, $s:ident => $body:expr) => {{
         let $s = $level.as_neon().expect("a level of the library has NEON");
         $body
     }};
 }
-#[cfg(not(any(target_arch = "x86", target_arch = "x86_64", target_arch = "aarch64")))]
+#[cfg(not(any(target_arch = "x86", target_arch = "x86_64", all(target_arch = "aarch64", target_feature = "neon"))))]
 macro_rules! at_simd_level {
     ($level:ident, $s:ident => $body:expr) => {{
         let (_, $s) = ($level, $crate::simd::Scalar);

@@ -9,7 +9,10 @@ use kinetoscope_sensors::{
     ActuatorStateCfg, ContactSensorCfg, FrameTransformerCfg, ImuCfg, JointStateCfg, JointWrenchCfg, MujocoSensorCfg,
     SamplingCfg, SensorCfg, TargetFrameCfg,
 };
-use kinetoscope_sim::{MjcfPartCfg, ObjectShape, RigidObjectCfg, SimulationManager, SimulationManagerCfg};
+use kinetoscope_sim::{
+    EnvId, MjcfPartCfg, ObjectShape, RigidObjectCfg, SimulationManager, SimulationManagerCfg, WrenchFrame,
+};
+use ndarray::Array2;
 
 /// A pendulum with sensors of its own.
 const PENDULUM: &str = r#"<mujoco><worldbody><body name="rod" pos="1.2 0.3 0.8"><joint name="hinge" axis="0 1 0"/>
@@ -52,6 +55,11 @@ fn steps() {
     for threads in [1, 3] {
         let mut sim = world(threads);
         assert_no_allocation(&mut sim, "no sensors");
+        // A wrench in link axes is another one in every step.
+        let (force, torque) = (Array2::from_elem((1, 3), 0.01), Array2::from_elem((1, 3), 0.001));
+        let ball = sim.entities().rigid_object_id("ball").unwrap();
+        sim.rigid_object_mut(ball).set_external_wrench(&force, &torque, WrenchFrame::Link, Some(&[EnvId(1)])).unwrap();
+        assert_no_allocation(&mut sim, "a wrench in link axes");
         let contact = ContactSensorCfg {
             filters: vec!["ground".into()],
             track_air_time: true,
