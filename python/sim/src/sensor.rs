@@ -100,7 +100,8 @@ impl Sensor {
         self.value(py, channel, Instant::Current).map(|values| values.into_python(py))
     }
 
-    /// Current values of a channel. With ``out``, they are copied into that array, which is returned.
+    /// Current values of a channel, shape (num_envs, ...). With ``out``, they are copied into that array, which is returned:
+    /// it has the same shape and element type.
     #[pyo3(signature = (channel, out=None))]
     fn read<'py>(&self, py: Python<'py>, channel: &str, out: Option<Bound<'py, PyAny>>) -> PyResult<Bound<'py, PyAny>> {
         let Some(out) = out else { return self.__getitem__(py, channel) };
@@ -110,7 +111,7 @@ impl Sensor {
         Ok(out)
     }
 
-    /// Past values of a channel, newest first on the second axis.
+    /// Past values of a channel, newest first on the second axis: the shape is (num_envs, history, ...).
     fn history<'py>(&self, py: Python<'py>, channel: &str) -> PyResult<Bound<'py, PyAny>> {
         self.value(py, channel, Instant::History).map(|values| values.into_python(py))
     }
