@@ -118,6 +118,7 @@ __all__ = [
     "inspect",
     "json_schema",
     "mujoco_version",
+    "read_calibration",
     "read_series",
     "recording_topics",
     "recover",
@@ -148,6 +149,10 @@ def mujoco_version() -> str:
     """Version of the MuJoCo library that is loaded."""
 def to_toml(scene: _Fields) -> str:
     """Text of a scene file: the scene as Rust reads it, with all fields."""
+def read_calibration(path: str | os.PathLike[str]) -> dict[str, Any]:
+    """Fields of a ``CameraCfg`` from a calibration file of ROS: width, height, intrinsics, lens, and a renderer that
+    supports the lens, for ``CameraCfg(**read_calibration("wrist.yaml"))``.
+    """
 def read_series(
     path: str | os.PathLike[str], topic: str, field: str, env: int | None = None
 ) -> list[_Array]:

@@ -1,5 +1,6 @@
 """Types of handles of the extension module: robots, objects, sensors. ``_sim.pyi`` has the module."""
 
+import os
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, Literal, Self, TypeAlias, TypeVar, final, overload
 
@@ -16,6 +17,7 @@ _Numbers: TypeAlias = Sequence[float] | NDArray[Any]
 _Fields: TypeAlias = Mapping[str, Any]
 _Axes: TypeAlias = Literal["ros", "opengl", "open_gl", "world"]
 _Level: TypeAlias = Literal["instance", "link", "semantic"]
+_Side: TypeAlias = Literal["left", "right"]
 _Out = TypeVar("_Out", bound=_Array)
 
 
@@ -515,6 +517,38 @@ class Sensor:
     def __repr__(self) -> str: ...
     def __str__(self) -> str: ...
     def _repr_html_(self, /) -> str: ...
+    @property
+    def latest_delivered_stamps(self) -> _Array:
+        """Capture times of the latest delivered images of a camera [s], shape (num_envs,)."""
+    @property
+    def stamp_history(self) -> _Array:
+        """Capture times of the images in the history of a camera [s], newest first, shape (num_envs, history); 0 for
+        entries that are not filled yet.
+        """
+    def camera_info(self, /, env: int = 0, side: _Side | None = None) -> dict[str, Any]:
+        """Calibration of a camera in one environment, in the form of ROS's ``camera_info``: a dict of ``name``,
+        ``width``, ``height``, ``distortion_model``, ``distortion_coefficients``, and the float64 matrices
+        ``camera_matrix`` (3, 3), ``rectification_matrix`` (3, 3) and ``projection_matrix`` (3, 4). The center of the
+        first pixel is at (0, 0). ``side`` is the camera of a pair, ``"left"`` or ``"right"``.
+        """
+    def latest_delivered(self, /, channel: str) -> _Array:
+        """Latest delivered images of a channel of a camera, shape (num_envs, ...). With a latency and after a write
+        to the state, they are older than the current ones, which show the state at once.
+        """
+    def rectification(self, /, env: int = 0) -> dict[str, _Array]:
+        """Rectification of the images of a stereo camera in one environment: a dict of ``rotations``, shape (2, 3,
+        3), from the frames of the left and the right camera to their rectified frames, and ``projections``, shape
+        (2, 3, 4), from the rectified left frame to the pixels of the rectified images, with the center of the first
+        pixel at (0.5, 0.5).
+        """
+    def set_left_right_intrinsics(self, /, left: ArrayLike, right: ArrayLike, env_ids: _Envs = None) -> None:
+        """Sets different intrinsics for the cameras of a pair: rows fx fy cx cy [pixels] of the left and of the
+        right camera.
+        """
+    def write_calibration(self, /, path: str | os.PathLike[str], env: int = 0, side: _Side | None = None) -> None:
+        """Writes the calibration of a camera to a YAML file of ROS, which ``read_calibration`` and ROS's tools read.
+        An existing file is replaced. ``side`` is the camera of a pair, ``"left"`` or ``"right"``.
+        """
     def history(self, /, channel: str) -> _Array:
         """Past values of a channel, newest first on the second axis: the shape is (num_envs, history, ...)."""
     def local_pose(self, /, convention: _Axes = "ros") -> _Array:

@@ -6,6 +6,7 @@
 #![forbid(unsafe_code)]
 
 mod arguments;
+mod calibration;
 mod cfg;
 mod channels;
 mod dynamics;
@@ -174,6 +175,7 @@ fn _sim(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(bundled_robot, module)?)?;
     module.add_function(wrap_pyfunction!(inspect, module)?)?;
     module.add_function(wrap_pyfunction!(json_schema, module)?)?;
+    module.add_function(wrap_pyfunction!(calibration::read_calibration, module)?)?;
     module.add_function(wrap_pyfunction!(mujoco_version, module)?)?;
     module.add_function(wrap_pyfunction!(recording::recover, module)?)?;
     module.add_function(wrap_pyfunction!(simulation::to_toml, module)?)?;
