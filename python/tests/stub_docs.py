@@ -61,7 +61,8 @@ def documented(stub: str, module: ModuleType) -> str:
             if is_old:
                 lines[first.lineno - 1 : first.end_lineno] = new
             elif isinstance(node, ast.ClassDef):
-                lines[first.lineno - 1 : first.lineno - 1] = [*new, ""]
+                start = min([first.lineno, *(decorator.lineno for decorator in getattr(first, "decorator_list", []))])
+                lines[start - 1 : start - 1] = [*new, ""]
             else:
                 # The body `...` is on the last line of the signature.
                 at = first.lineno - 1

@@ -375,7 +375,12 @@ def test_recordings_are_replayed_bit_by_bit(tmp_path):
     times, values = ks.read_series(path, topic, field)
     np.testing.assert_array_equal(values[-1], recorded[-1, 0, 0])
     assert (np.diff(times) >= 0).all()
+    pairs = ks.read_series(path, topic, [field, names[topic][1]])
+    assert len(pairs) == 2
+    np.testing.assert_array_equal(pairs[0], [times, values])
+    np.testing.assert_array_equal(pairs[1][1], ks.read_series(path, topic, names[topic][1])[1])
     playback = ks.Playback(path)
+    assert playback.joints_without_data == []
     assert len(playback) == len(playback.times) >= 30
     (part,) = (playback.sim[name] for name in playback.sim)
     ((column, _),) = part.qpos_columns([".*JOINT2"])

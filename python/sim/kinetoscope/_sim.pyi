@@ -105,6 +105,7 @@ __all__ = [
     "Task",
     "Terrain",
     "Topic",
+    "Viewer",
     "Weld",
     "Window",
     "_NONE_IS_FALSE",
@@ -153,10 +154,16 @@ def read_calibration(path: str | os.PathLike[str]) -> dict[str, Any]:
     """Fields of a ``CameraCfg`` from a calibration file of ROS: width, height, intrinsics, lens, and a renderer that
     supports the lens, for ``CameraCfg(**read_calibration("wrist.yaml"))``.
     """
-def read_series(
-    path: str | os.PathLike[str], topic: str, field: str, env: int | None = None
-) -> list[_Array]:
-    """Times [s] and values of a number in a recording, shape (rows,) each."""
+@overload
+def read_series(path: str | os.PathLike[str], topic: str, field: str, env: int | None = None) -> list[_Array]:
+    """Times [s] and values of a number in a recording, shape (rows,) each. Of a list of fields, a list of such
+    pairs, read in one pass.
+    """
+@overload
+def read_series(path: str | os.PathLike[str], topic: str, field: list[str], env: int | None = None) -> list[list[_Array]]:
+    """Times [s] and values of a number in a recording, shape (rows,) each. Of a list of fields, a list of such
+    pairs, read in one pass.
+    """
 def recording_topics(path: str | os.PathLike[str]) -> list[tuple[str, list[str]]]:
     """Names of the topics of a recording, each with the names of its numbers."""
 def _default_fields(name: str) -> str: ...
@@ -189,6 +196,9 @@ class Playback:
     """Playback of a recording: ``seek`` puts the simulation ``sim`` into the state of a recorded frame."""
 
     def __new__(cls, path: str | os.PathLike[str], sim: SimulationManager | None = None) -> Self: ...
+    @property
+    def joints_without_data(self) -> list[str]:
+        """Names of the joints that the recording has no positions of; they stay where they were."""
     @property
     def sim(self) -> SimulationManager:
         """Simulation that shows the recording: the recorded scene as MJCF parts."""
@@ -433,6 +443,8 @@ class SimulationManager:
         """Steps all environments ``steps`` times. Ctrl+C ends the call after at most one block of steps, also while
         a viewer pauses the simulation or sets its speed.
         """
+    def viewer(self, /) -> Viewer:
+        """Adds a viewer that pauses, steps and paces the simulation from the program."""
     def verify_recording(self, /, path: str | os.PathLike[str]) -> dict[str, Any]:
         """Replays a recording (``.npz`` or ``.mcap``) in this simulation, built as the recorded one was, and
         compares the states bit by bit. Returns a dict: ``identical``, ``steps``, ``values``, and ``difference`` (a
@@ -593,6 +605,35 @@ class Topic:
     @staticmethod
     def task_results() -> Topic:
         """Rewards and ends of episodes."""
+
+@final
+class Viewer:
+    """A viewer that is a program, made by ``SimulationManager.viewer``: it pauses, steps and paces the simulation,
+    while another thread steps it by ``update``, which handles commands after each step. Its pause and speed end with
+    ``close``.
+    """
+
+    @property
+    def state(self) -> dict[str, Any]:
+        """State of the simulation when it last published one, at most 30 times per second: a dict of ``steps`` since
+        the simulation was created, ``paused``, ``speed`` (None for no limit), ``measured_speed`` (simulated seconds
+        per second, or None) and ``refusal``, the reason of the last refused command, or None.
+        """
+    def __enter__(self, /) -> Self: ...
+    def __exit__(self, /, *_exception: object) -> None: ...
+    def __repr__(self) -> str: ...
+    def close(self, /) -> None:
+        """Ends the viewer, its pause and its speed. A second call does nothing."""
+    def pause(self, /) -> None:
+        """Pauses the simulation: ``update`` waits until any viewer resumes it, or this one is closed."""
+    def reset(self, /, env: int | None = None) -> None:
+        """Resets an environment, or all, after the next step."""
+    def resume(self, /) -> None:
+        """Resumes the simulation, whichever viewer paused it."""
+    def set_speed(self, /, speed: float | None) -> None:
+        """Sets the speed: simulated seconds per second, from 0.001 to 1000, or None for no limit."""
+    def step(self, /, steps: int = 1) -> None:
+        """Runs this many steps inside the calls of ``update``, then pauses."""
 
 @final
 class Window:

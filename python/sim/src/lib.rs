@@ -23,6 +23,7 @@ mod snapshot;
 mod task;
 mod values;
 mod viewer;
+mod viewer_control;
 
 use errors::Failure;
 use pyo3::prelude::*;
@@ -171,6 +172,7 @@ fn _sim(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<recording::FoxgloveServer>()?;
     module.add_class::<viewer::Server>()?;
     module.add_class::<viewer::Window>()?;
+    module.add_class::<viewer_control::Viewer>()?;
     module.add_function(wrap_pyfunction!(asset_path, module)?)?;
     module.add_function(wrap_pyfunction!(bundled_robot, module)?)?;
     module.add_function(wrap_pyfunction!(inspect, module)?)?;

@@ -8,6 +8,7 @@ use crate::simulation::Simulation;
 use kinetoscope::prelude::Record as _;
 use kinetoscope::record::{
     self, FieldSelector, Format, FoxgloveCfg, OverviewCfg, RecorderCfg, RecorderId, Recording, StreamToFoxglove as _,
+    TimeSeries,
 };
 use kinetoscope::sim::EnvId;
 use numpy::{IntoPyArray, PyArray1};
@@ -457,6 +458,12 @@ impl Playback {
         py.detach(|| self.lock().times().to_vec()).into_pyarray(py)
     }
 
+    /// Names of the joints that the recording has no positions of; they stay where they were.
+    #[getter]
+    fn joints_without_data(&self, py: Python<'_>) -> Vec<String> {
+        py.detach(|| self.lock().joints_without_data().to_vec())
+    }
+
     /// Shows a frame, by its index in ``times``.
     fn seek(&self, py: Python<'_>, frame: usize) -> PyResult<()> {
         self.shared.write(py, |sim| {
@@ -493,23 +500,31 @@ impl Playback {
     }
 }
 
-/// Times [s] and values of a number in a recording, shape (rows,) each.
+/// Times [s] and values of a number in a recording, shape (rows,) each. Of a list of fields, a list of such pairs, read in one
+/// pass.
 #[pyfunction]
 #[pyo3(signature = (path, topic, field, env=None))]
 pub(crate) fn read_series<'py>(
     py: Python<'py>,
     path: PathBuf,
     topic: &str,
-    field: &str,
+    field: &Bound<'py, PyAny>,
     env: Option<usize>,
-) -> PyResult<[Bound<'py, PyArray1<f64>>; 2]> {
+) -> PyResult<Bound<'py, PyAny>> {
+    let single = field.is_instance_of::<PyString>();
+    let fields: Vec<String> = if single { vec![field.extract()?] } else { field.extract()? };
     let series = detached(py, || {
         let recording = Recording::open(path)?;
         let topic = recording.topic(topic, env)?.name.clone();
-        Ok(recording.time_series(&[FieldSelector::new(topic, field)])?)
+        let selectors: Vec<_> = fields.iter().map(|field| FieldSelector::new(topic.clone(), field)).collect();
+        Ok(recording.time_series(&selectors)?)
     })?;
-    let first = series.into_iter().next().unwrap_or_default();
-    Ok([first.times.into_pyarray(py), first.values.into_pyarray(py)])
+    let pair = |series: TimeSeries| [series.times.into_pyarray(py), series.values.into_pyarray(py)];
+    if single {
+        let first = series.into_iter().next().unwrap_or_default();
+        return Ok(pair(first).into_pyobject(py)?.into_any());
+    }
+    Ok(series.into_iter().map(pair).collect::<Vec<_>>().into_pyobject(py)?.into_any())
 }
 
 /// Makes a complete MCAP file from the partial file of a recording that was killed. ``path`` is the intended path of the
