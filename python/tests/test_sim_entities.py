@@ -135,6 +135,7 @@ def test_structure_of_robots():
     assert "<table>" in html and "JOINT1" in html
     sim.destroy()
     assert arm._repr_html_() == "&lt;Robot of a simulation that is destroyed&gt;"
+    assert "simulation that is destroyed" in sim._repr_html_()
 
 
 def every_entity():
