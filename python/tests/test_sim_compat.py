@@ -6,7 +6,6 @@ The scripts belong to their projects and are not in this one: ``KINETOSCOPE_SEED
 import ast
 import os
 import re
-import shutil
 import subprocess
 import sys
 import time
@@ -36,19 +35,6 @@ def run(name, tensors, flags, steps, **variables):
     environment |= {"KINETOSCOPE_COMPAT_STEPS": str(steps), **variables}
     command = [sys.executable, Path(seeds.__file__), name, tensors, *flags]
     return subprocess.run(command, capture_output=True, text=True, timeout=300, env=environment, check=False)
-
-
-@pytest.fixture
-def display():
-    """A virtual display."""
-    if shutil.which("Xvfb") is None:
-        pytest.fail("this test needs Xvfb")
-    process = subprocess.Popen(["Xvfb", "-displayfd", "1", "-screen", "0", "1280x800x24"], stdout=subprocess.PIPE, text=True)
-    try:
-        yield f":{process.stdout.readline().strip()}"
-    finally:
-        process.terminate()
-        process.wait()
 
 
 def without_imports(source):

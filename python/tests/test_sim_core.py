@@ -231,6 +231,8 @@ def test_names_and_collections(arm_sim):
     assert arm.uid == "arm" and arm.kind == "robot" and arm.dof == 6 == len(arm.joint_names)
     assert arm.joint_ids("arm") == [0, 1, 2, 3, 4, 5] == arm.joint_ids()
     assert "arm" in repr(sim) and "6 joints" in repr(arm)
+    table = sim._repr_html_()
+    assert table.count("<tr>") == len(sim) and "&lt;Robot" in table and "<Robot" not in table
     html = arm._repr_html_()
     assert html.count("<tr>") == 7 and "JOINT6" in html
     # The links are a tree: each is one level below its parent, with the joint between them.

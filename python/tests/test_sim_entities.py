@@ -135,6 +135,7 @@ def test_structure_of_robots():
     assert "<table>" in html and "JOINT1" in html
     sim.destroy()
     assert arm._repr_html_() == "&lt;Robot of a simulation that is destroyed&gt;"
+    assert "simulation that is destroyed" in sim._repr_html_()
 
 
 def every_entity():
@@ -220,6 +221,73 @@ def test_inverse_kinematics(arm_sim, rng):
         arm.compute_ik(targets, "arm", {"distance_tolerance": 1})
     with pytest.raises(ks.KinetoscopeError, match="amr"):
         arm.compute_ik(targets, "amr")
+
+
+LINKAGE = """<mujoco><option><flag contact="disable"/></option><worldbody><body name="base" pos="0 0 2"><geom size="0.1" mass="3"/>
+  <body name="upper" pos="0.1 0 0"><joint name="a" axis="0 1 0" armature="0.2"/><geom size="0.05" pos="0.3 0 0.1" mass="1"/>
+    <body name="lower" pos="0.5 0 0"><joint name="b" axis="1 0 1"/><geom size="0.04" pos="0.2 0.1 0" mass="0.7"/>
+      <body name="tip" pos="0.3 0 0"><joint name="c" type="slide" axis="0 0.6 0.8" armature="0.1"/><geom size="0.05" mass="0.4"/>
+</body></body></body></body></worldbody></mujoco>"""
+
+
+@pytest.mark.parametrize("fix_base", [True, False], ids=["fixed", "floating"])
+def test_dynamics_of_robots(fix_base, rng):
+    """Accelerations from rest, M a + g = tau, against those of MuJoCo's step."""
+    gravity = np.array([0.3, -1.0, -9.0])
+    sim = ks.SimulationManager(num_envs=3, ground=None, gravity=gravity, integrator="euler")
+    robot = sim.add_robot(uid="r", mjcf=ks.MjcfFile(text=LINKAGE), fix_base=fix_base, drive={"drive_type": "none"})
+    assert robot.dof == 3
+    root = robot.root_pose
+    root[:, 3:] = rng.normal(size=(3, 4))
+    root[:, 3:] /= np.linalg.norm(root[:, 3:], axis=1, keepdims=True)
+    if not fix_base:
+        robot.write_root_pose(root)
+    qpos, effort = rng.uniform(-0.5, 0.5, (3, 3)), rng.normal(size=(3, 3))
+    robot.write_qpos(qpos)
+    robot.set_qf_target(effort)
+    matrix, held = robot.mass_matrix(), robot.gravity_torque()
+    first = 0 if fix_base else 6
+    assert matrix.shape == (3, first + 3, first + 3) and held.shape == (3, first + 3)
+    np.testing.assert_allclose(matrix, matrix.transpose(0, 2, 1), rtol=0, atol=0)
+    # At given positions, of chosen environments: the root stays where it is.
+    np.testing.assert_array_equal(robot.mass_matrix(qpos[2:], env_ids=[2]), matrix[2:])
+    np.testing.assert_array_equal(robot.gravity_torque(qpos), held)
+    assert (robot.gravity_torque(np.zeros(3)) != held).any()
+    if not fix_base:
+        # The whole robot has its mass, and weighs as much.
+        mass = robot.total_mass
+        np.testing.assert_allclose(matrix[:, :3, :3], np.tile(mass * np.eye(3), (3, 1, 1)), atol=1e-12)
+        np.testing.assert_allclose(held[:, :3], np.tile(-mass * gravity, (3, 1)), atol=1e-12)
+    forces = np.concatenate([np.zeros((3, first)), effort], axis=1) - held
+    acceleration = np.linalg.solve(matrix, forces[..., None])[..., 0]
+    sim.update(1)
+    # Double precision, and a condition number of the matrix below 1e4.
+    assert np.linalg.cond(matrix).max() < 1e4
+    np.testing.assert_allclose(robot.qacc, acceleration[:, first:], rtol=1e-9, atol=1e-9)
+    with pytest.raises(ks.ArgumentError, match="mass_matrix"):
+        robot.mass_matrix(np.zeros((2, 3)))
+    with pytest.raises(ks.ArgumentError, match="gravity_torque"):
+        robot.gravity_torque(np.zeros(2))
+    with pytest.raises(ks.OutOfRangeError):
+        robot.mass_matrix(env_ids=[3])
+
+
+def test_reports_of_robots():
+    """The report of a file, against the simulation of the same file."""
+    report = ks.inspect(urdf=ks.asset("sr5/SR5.urdf"), qpos={"JOINT2": 0.5})
+    sim = ks.SimulationManager(gravity=[0, 0, -9.81])
+    arm = sim.add_robot(ks.RobotCfg(uid="arm", urdf=ks.asset("sr5/SR5.urdf")))
+    assert report["joint_names"] == report["columns"] == arm.joint_names
+    assert report["total_mass"] == pytest.approx(arm.total_mass, rel=1e-12)
+    qpos = [0.5 if name == "JOINT2" else 0.0 for name in arm.joint_names]
+    assert report["qpos"] == qpos
+    np.testing.assert_allclose(report["mass_matrix"], arm.mass_matrix(qpos)[0], atol=1e-12)
+    np.testing.assert_allclose(report["gravity_torque"], arm.gravity_torque(qpos)[0], atol=1e-12)
+    mjcf = ks.inspect(mjcf=ks.MjcfFile(text=LINKAGE))
+    assert mjcf["joint_names"] == ["a", "b", "c"] and len(mjcf["links"]) > 3
+    assert ks.inspect(ks.InspectCfg(urdf=ks.asset("sr5/SR5.urdf"), floating_base=True))["columns"][:2] == ["base.vx", "base.vy"]
+    with pytest.raises(ks.ModelError, match="JOINT2"):
+        ks.inspect(urdf=ks.asset("sr5/SR5.urdf"), qpos={"JOINT02": 0.5})
 
 
 def test_randomization_and_shards():
@@ -308,7 +376,12 @@ def test_recordings_are_replayed_bit_by_bit(tmp_path):
     times, values = ks.read_series(path, topic, field)
     np.testing.assert_array_equal(values[-1], recorded[-1, 0, 0])
     assert (np.diff(times) >= 0).all()
+    pairs = ks.read_series(path, topic, [field, names[topic][1]])
+    assert len(pairs) == 2
+    np.testing.assert_array_equal(pairs[0], [times, values])
+    np.testing.assert_array_equal(pairs[1][1], ks.read_series(path, topic, names[topic][1])[1])
     playback = ks.Playback(path)
+    assert playback.joints_without_data == []
     assert len(playback) == len(playback.times) >= 30
     (part,) = (playback.sim[name] for name in playback.sim)
     ((column, _),) = part.qpos_columns([".*JOINT2"])

@@ -149,6 +149,34 @@ def test_pace_of_a_viewer():
     assert paced > 0.24 and free < paced
 
 
+def test_a_program_as_a_viewer():
+    """A paused simulation waits in ``update``, runs single steps, and goes on when the viewer is closed. The command to pause
+    is handled after the first step."""
+    code = (
+        "import threading, time, kinetoscope as ks\n"
+        "sim = ks.SimulationManager(threads=1)\nviewer = sim.viewer()\nviewer.pause()\n"
+        "thread = threading.Thread(target=sim.update, args=(20,), daemon=True)\nthread.start()\n"
+        "def reached(steps):\n"
+        "    for _ in range(400):\n"
+        "        if round(sim.time[0] / sim.physics_dt) == steps and viewer.state['paused']:\n            return True\n"
+        "        time.sleep(0.05)\n"
+        "assert reached(1)\ntime.sleep(0.3)\nassert reached(1) and thread.is_alive()\n"
+        "viewer.step(3)\nassert reached(4)\nviewer.step()\nassert reached(5)\ntime.sleep(0.3)\nassert reached(5)\n"
+        "assert viewer.state['steps'] == 5 and viewer.state['refusal'] is None\n"
+        "viewer.resume()\nthread.join(20)\nassert not thread.is_alive() and round(sim.time[0] / sim.physics_dt) == 20\n"
+        # At half of real time, 50 steps of 10 ms take 1 s; the first steps handle the command and start the clock.
+        "viewer.set_speed(0.5)\nstarted = time.perf_counter()\nsim.update(50)\nassert time.perf_counter() - started > 0.9\n"
+        "assert viewer.state['speed'] == 0.5\n"
+        "viewer.reset(0)\nsim.update(2)\nassert sim.time[0] < 3 * sim.physics_dt\n"
+        "viewer.pause()\nviewer.close()\nviewer.close()\nsim.update(5)\nprint(repr(viewer))\n"
+        "for call in (viewer.pause, lambda: viewer.state, lambda: sim.viewer().set_speed(0), lambda: sim.viewer().reset(1)):\n"
+        "    try:\n        call()\n    except ks.KinetoscopeError as error:\n        print(type(error).__name__)\n"
+    )
+    result = python(code)
+    expected = ["<Viewer, closed>", "ViewerError", "ViewerError", "ArgumentError", "OutOfRangeError"]
+    assert result.stdout.split("\n")[:-1] == expected, result.stdout + result.stderr
+
+
 def test_import_needs_the_library_of_mujoco(tmp_path):
     """Without the package mujoco, or with another version of its library, the error says what to install."""
     (tmp_path / "mujoco").mkdir()

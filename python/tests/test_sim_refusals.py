@@ -130,7 +130,9 @@ def test_misspelt_attributes_are_refused():
         (lambda sim: sim.add_robot(urdf="a", drive=ks.CameraCfg()), ("drive", "CameraCfg", "DriveCfg")),
         (lambda sim: sim.add_robot(ks.RobotCfg(drive=ks.CameraCfg())), ("drive", "CameraCfg", "DriveCfg")),
         (lambda sim: sim.randomize(ks.IkCfg()), ("IkCfg", "Randomization")),
-        (lambda sim: ks.Task(sim, ks.IkCfg()), ("IkCfg", "task")),
+        (lambda sim: ks.Task(sim, ks.IkCfg()), ("IkCfg", "TaskCfg")),
+            (lambda sim: sim.record(ks.ServeCfg()), ("ServeCfg", "RecorderCfg")),
+            (lambda sim: sim.screenshot(cfg=ks.WindowCfg()), ("WindowCfg", "ScreenshotCfg")),
     ],
 )  # fmt: skip
 def test_configurations_of_another_class_are_refused(call, names):

@@ -1,13 +1,16 @@
 """Types: the package passes mypy in strict mode, and the stub of the extension module fits it."""
 
+import ast
 import re
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
+import stub_docs
 
 import kinetoscope
+from kinetoscope import _sim
 
 PACKAGE = Path(kinetoscope.__file__).parent
 PROJECT = Path(__file__).parents[2]
@@ -38,6 +41,22 @@ def strict(tmp_path):
 def test_the_stub_fits_the_module():
     result = run("mypy.stubtest", "kinetoscope._sim")
     assert result.returncode == 0, result.stdout
+
+
+def test_the_stub_has_the_documentation_of_the_module():
+    """Each public item has the documentation of the module. Texts about arrays give the shape."""
+    for name in stub_docs.STUBS:
+        text = (PACKAGE / name).read_text()
+        assert text.count("\n") <= 800, name
+        expected = stub_docs.documented(text, _sim)
+        assert text == expected, f"{name}: run python python/tests/stub_docs.py"
+        # A control: a changed text, and one that is missing, are found.
+        line = re.search(r'^ +def \w+\(.*:\n( +"""\w.*""")$', text, re.MULTILINE).group(1)
+        assert stub_docs.documented(text.replace(line, f'{line[:-4]}, in other words."""', 1), _sim) == expected
+        assert stub_docs.documented(text.replace(f":\n{line}", ": ...", 1), _sim) == expected
+        for node in ast.walk(ast.parse(text)):
+            if isinstance(node, ast.FunctionDef) and stub_docs.is_documented(node.name) and "Array" in ast.unparse(node.returns):
+                assert "shape" in ast.get_docstring(node), node.name
 
 
 def test_strict_types(strict):

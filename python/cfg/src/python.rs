@@ -1,7 +1,7 @@
 //! Texts of the Python modules.
 
 use crate::source::{Content, Field, Variant, find_enum, find_struct, parse};
-use crate::types::{AREAS, DECLARED_ENUMS, ENUMS, Struct, area, structs};
+use crate::types::{AREAS, DECLARED_ENUMS, Declared, ENUMS, Struct, area, python_name, structs, variant_defaults};
 use crate::words::{in_python, wrapped};
 use std::cell::RefCell;
 use std::collections::{BTreeMap, BTreeSet};
@@ -138,15 +138,27 @@ fn import(module: &str, names: &[&str]) -> String {
     format!("from .{module} import (\n{})\n", names.iter().map(|name| format!("    {name},\n")).collect::<String>())
 }
 
-fn declared(name: &str, class: Option<&str>) -> Variant {
-    let content = match class.and_then(|class| syn::parse_str(class).ok()) {
-        Some(class) => Content::Value(class),
-        None => Content::Nothing,
-    };
-    Variant { name: name.into(), doc: String::new(), content }
-}
-
 impl Context {
+    /// A variant of a declared enumeration. The documentation of a content is the first sentence of that of its class.
+    fn declared(&self, root: &Path, name: &str, content: Declared) -> Result<Variant, String> {
+        let (doc, content) = match content {
+            Declared::Name(doc) => (doc.to_string(), Content::Nothing),
+            Declared::Empty(doc) => (doc.to_string(), Content::Fields(Vec::new())),
+            Declared::Class(class) => {
+                let known = self.structs.iter().find(|known| known.class == class);
+                let known = known.ok_or_else(|| format!("{name}: no class {class}"))?;
+                let (doc, _) = find_struct(&parse(root, known.file)?, known.name).unwrap_or_default();
+                let doc = self.doc(doc.split("\n\n").next().unwrap_or_default())?.replace('\n', " ");
+                let sentence = doc.split_inclusive(". ").next().unwrap_or_default().trim_end();
+                // A sentence with a formula after it ends before the colon.
+                let end = if sentence.ends_with('.') { None } else { sentence.split_once(':') };
+                let sentence = end.map_or_else(|| sentence.to_string(), |(start, _)| format!("{start}."));
+                (sentence, Content::Value(syn::parse_str(class).map_err(|error| format!("{class}: {error}"))?))
+            }
+        };
+        Ok(Variant { name: name.into(), doc, content })
+    }
+
     /// Classes and literal types of a module, and their names.
     fn items(&self, root: &Path, module: &str) -> Result<(String, BTreeSet<String>), String> {
         let (mut text, mut names) = (String::new(), BTreeSet::new());
@@ -162,11 +174,11 @@ impl Context {
                 }
             }
             text.push_str(&self.enumeration(known.name, &doc, &variants));
-            names.insert(known.name.to_string());
+            names.insert(python_name(known.name).to_string());
         }
         for known in DECLARED_ENUMS.iter().filter(|known| known.area == module) {
-            let variants: Vec<Variant> = known.variants.iter().map(|(name, class)| declared(name, *class)).collect();
-            text.push_str(&self.enumeration(known.name, known.doc, &variants));
+            let variants = known.variants.iter().map(|(name, content)| self.declared(root, name, *content));
+            text.push_str(&self.enumeration(known.name, known.doc, &variants.collect::<Result<Vec<_>, _>>()?));
             names.insert(known.name.to_string());
         }
         for known in self.structs.iter().filter(|known| area(known.file) == module) {
@@ -210,7 +222,7 @@ impl Context {
             let _ = write!(text, "\n{name}: TypeAlias = Literal[{}]\n{}", names.join(", "), docstring(&doc, 0));
             return text;
         }
-        let _ = write!(text, "\n\nclass {name}:\n{}", docstring(doc, 4));
+        let _ = write!(text, "\n\nclass {}:\n{}", python_name(name), docstring(doc, 4));
         for variant in variants {
             let id = &variant.name;
             match &variant.content {
@@ -226,10 +238,17 @@ impl Context {
                     );
                 }
                 Content::Fields(fields) => {
+                    let defaults = variant_defaults(name);
+                    let defaults = defaults.get(id).and_then(Value::as_table);
                     let arguments: Vec<String> = fields
                         .iter()
                         .map(|field| {
-                            let default = if field.optional { " = None" } else { "" };
+                            let known = defaults.and_then(|defaults| defaults.get(&field.name));
+                            let default = match known {
+                                Some(value) => format!(" = {}", literal(value)),
+                                None if field.optional => " = None".into(),
+                                None => String::new(),
+                            };
                             let none = if field.optional && !is_option(&field.ty) { " | None" } else { "" };
                             format!("{}: {}{none}{default}", field.name, self.annotation(&field.ty))
                         })
@@ -378,7 +397,12 @@ impl Context {
             "Vector3" => "Sequence[float]".into(),
             "UnitQuaternion" => "Sequence[float] | Mapping[str, Sequence[float]]".into(),
             "Channels" => "Sequence[str]".into(),
-            "Array2" => "Any".into(),
+            "SocketAddr" => "str".into(),
+            "EnvId" => "int".into(),
+            // A table of other tables, whose keys the reader checks.
+            "Table" => "Mapping[str, Any]".into(),
+            // A class of the extension module.
+            "Array2" | "Topic" => "Any".into(),
             // A path in place of a table.
             "UrdfCfg" | "MjcfFile" => {
                 self.note(&name);
@@ -405,7 +429,7 @@ impl Context {
 }
 
 /// Enumerations without content in any variant, whose names are literal types.
-const PLAIN: [&str; 14] = [
+const PLAIN: [&str; 16] = [
     "Integrator",
     "FrictionCone",
     "BodyType",
@@ -415,6 +439,8 @@ const PLAIN: [&str; 14] = [
     "DriveType",
     "CameraConvention",
     "DepthMiss",
+    "StereoOrigin",
+    "Format",
     "ToneCurve",
     "GridOrder",
     "RayAlignment",

@@ -1,7 +1,8 @@
 //! Structs and enumerations of the Rust sources: fields, types, documentation, serde attributes.
 
 use std::path::Path;
-use syn::{Attribute, Expr, Fields, File, Item, Lit, Meta, Type};
+use syn::parse::{ParseStream, Parser as _};
+use syn::{Attribute, Expr, Fields, File, Ident, Item, ItemMacro, Lit, LitStr, Meta, Token, Type};
 
 /// A field of a struct or of a variant.
 #[derive(Debug)]
@@ -43,14 +44,76 @@ pub(crate) fn find_struct(file: &File, name: &str) -> Option<(String, Vec<Field>
                 .any(|attribute| attribute == "default" || attribute.starts_with("try_from"));
             Some((doc(&item.attrs), fields(&item.fields, default)))
         }
+        Item::Macro(item) if item.mac.path.is_ident("fisheye") => {
+            fisheye(item).filter(|(found, ..)| found == name).map(|(_, doc, field)| (doc, vec![field]))
+        }
+        Item::Macro(item) if item.mac.path.is_ident("imperfections") && name == "Imperfections" => {
+            let doc = "Imperfections of a camera. A field that is `None`, the default, has no effect.";
+            Some((doc.replace('`', "``"), imperfections(item)?))
+        }
         _ => None,
     })
+}
+
+/// Name and documentation of a lens that `fisheye!` declares, and its only field.
+fn fisheye(item: &ItemMacro) -> Option<(String, String, Field)> {
+    let parse = |input: ParseStream<'_>| {
+        let attributes = input.call(Attribute::parse_outer)?;
+        let name: Ident = input.parse()?;
+        input.parse::<Token![:]>()?;
+        // The name in files and its aliases, then `angles up to $most, $allowed`.
+        input.parse::<LitStr>()?;
+        input.parse::<Token![,]>()?;
+        input.parse::<Expr>()?;
+        input.parse::<Token![;]>()?;
+        (0..3).try_for_each(|_| input.parse::<Ident>().map(drop))?;
+        input.parse::<Expr>()?;
+        input.parse::<Token![,]>()?;
+        let allowed: LitStr = input.parse()?;
+        skip(input)?;
+        let text = format!("Largest visible angle from the optical axis [rad]: {}.", allowed.value());
+        let field = Field { name: "max_angle".into(), ty: syn::parse_str("f64")?, doc: text, optional: true };
+        Ok((name.to_string(), doc(&attributes), field))
+    };
+    parse.parse2(item.mac.tokens.clone()).ok()
+}
+
+/// Fields of the struct that `imperfections!` declares: a list of those of light, and of those of depth.
+fn imperfections(item: &ItemMacro) -> Option<Vec<Field>> {
+    let parse = |input: ParseStream<'_>| {
+        let mut fields = Vec::new();
+        while !input.is_empty() {
+            input.parse::<Ident>()?;
+            let list;
+            syn::braced!(list in input);
+            while !list.is_empty() {
+                let attributes = list.call(Attribute::parse_outer)?;
+                let name: Ident = list.parse()?;
+                list.parse::<Token![::]>()?;
+                let ty: Ident = list.parse()?;
+                list.parse::<Token![,]>()?;
+                let ty = syn::parse_str(&format!("Option<{ty}>"))?;
+                fields.push(Field { name: name.to_string(), ty, doc: doc(&attributes), optional: true });
+            }
+        }
+        Ok(fields)
+    };
+    parse.parse2(item.mac.tokens.clone()).ok()
+}
+
+/// Skips the rest of the input of a macro.
+fn skip(input: ParseStream<'_>) -> syn::Result<()> {
+    while !input.is_empty() {
+        input.step(|cursor| Ok(((), cursor.token_tree().map_or(*cursor, |(_, rest)| rest))))?;
+    }
+    Ok(())
 }
 
 /// Documentation and variants of an enumeration.
 pub(crate) fn find_enum(file: &File, name: &str) -> Option<(String, Vec<Variant>)> {
     file.items.iter().find_map(|item| match item {
         Item::Enum(item) if item.ident == name => {
+            let is_lowercase = serde_attributes(&item.attrs).any(|attribute| attribute == "rename_all=\"lowercase\"");
             let variant = |variant: &syn::Variant| {
                 let renamed = serde_attributes(&variant.attrs).find_map(|attribute| {
                     attribute.strip_prefix("rename=").map(|name| name.trim_matches('"').to_string())
@@ -63,7 +126,9 @@ pub(crate) fn find_enum(file: &File, name: &str) -> Option<(String, Vec<Variant>
                     },
                     Fields::Named(_) => Content::Fields(fields(&variant.fields, false)),
                 };
-                let name = renamed.unwrap_or_else(|| snake_case(&variant.ident.to_string()));
+                let plain = variant.ident.to_string();
+                let name =
+                    renamed.unwrap_or_else(|| if is_lowercase { plain.to_lowercase() } else { snake_case(&plain) });
                 Variant { name, doc: doc(&variant.attrs), content }
             };
             Some((doc(&item.attrs), item.variants.iter().map(variant).collect()))
@@ -75,6 +140,10 @@ pub(crate) fn find_enum(file: &File, name: &str) -> Option<(String, Vec<Variant>
 fn fields(fields: &Fields, default: bool) -> Vec<Field> {
     let field = |field: &syn::Field| {
         let name = field.ident.as_ref()?.to_string();
+        // Not part of files.
+        if serde_attributes(&field.attrs).any(|attribute| attribute == "skip") {
+            return None;
+        }
         let own_default = serde_attributes(&field.attrs).any(|attribute| attribute.starts_with("default"));
         let optional = default || own_default || is_option(&field.ty);
         Some(Field { name, ty: field.ty.clone(), doc: doc(&field.attrs), optional })
@@ -110,7 +179,7 @@ fn doc(attributes: &[Attribute]) -> String {
             code = if code.is_some() { None } else { Some(language == "text") };
         } else if code == Some(true) {
             lines.push(format!("    {}", line.trim_end()));
-        } else if code.is_none() {
+        } else if code.is_none() && !(line.is_empty() && lines.last().is_some_and(String::is_empty)) {
             lines.push(line.trim_end().to_string());
         }
     }
@@ -142,7 +211,10 @@ fn without_links(text: &str) -> String {
             kept.push_str(label);
         }
         rest = target.map_or(after, |end| &after[end + 1..]);
-        if let Some(definition) = rest.strip_prefix(':').filter(|_| kept.rsplit('\n').next() == Some(label)) {
+        // The target of a definition is one word.
+        let is_word = |text: &&str| text.lines().next().is_some_and(|line| line.split_whitespace().count() == 1);
+        let is_alone = kept.rsplit('\n').next() == Some(label);
+        if let Some(definition) = rest.strip_prefix(':').filter(|text| is_alone && is_word(text)) {
             kept.truncate(kept.len() - label.len());
             rest = definition.split_once('\n').map_or("", |(_, next)| next);
         }

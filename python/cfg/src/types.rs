@@ -1,10 +1,14 @@
 //! The configuration types of the Python package, each with its source file and its default value.
 
+use kinetoscope::record;
 use kinetoscope::render;
 use kinetoscope::robot;
 use kinetoscope::scene;
 use kinetoscope::sensors;
+use kinetoscope::sensors::camera::imperfection;
 use kinetoscope::sim;
+use kinetoscope::tasks;
+use kinetoscope::viewer;
 use serde::Serialize;
 use toml::{Table, Value};
 
@@ -31,32 +35,46 @@ pub(crate) struct Enum {
     pub(crate) name: &'static str,
 }
 
-/// An enumeration that a macro declares: its module, its name and documentation, its variants with the class of their
-/// content.
+/// An enumeration that a macro declares: its module, its name and documentation, its variants with their content.
 #[derive(Debug)]
 pub(crate) struct DeclaredEnum {
     pub(crate) area: &'static str,
     pub(crate) name: &'static str,
     pub(crate) doc: &'static str,
-    pub(crate) variants: &'static [(&'static str, Option<&'static str>)],
+    pub(crate) variants: &'static [(&'static str, Declared)],
+}
+
+/// Content of a variant of a declared enumeration.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Declared {
+    /// No content: the name alone. With its documentation.
+    Name(&'static str),
+    /// A table without keys. With its documentation.
+    Empty(&'static str),
+    /// An object of a class, which also has the documentation.
+    Class(&'static str),
 }
 
 /// The modules of the package `cfg`, and the items of each in words. A module uses those before it.
-pub(crate) const AREAS: [(&str, &str); 9] = [
+pub(crate) const AREAS: [(&str, &str); 13] = [
     ("shapes", "shapes, surfaces and collision geometry"),
     ("simulation", "simulations, the ground, lights and shards"),
     ("robots", "robots, articulations, their files and drives"),
     ("kinematics", "inverse kinematics"),
     ("objects", "rigid objects, groups, terrains, MJCF parts and welds"),
     ("sampling", "the rate, latency and noise of sensors"),
-    ("cameras", "cameras, lenses and renderers"),
+    ("rendering", "renderers, lenses, apertures and shutters"),
+    ("cameras", "cameras and their imperfections"),
     ("sensors", "sensors other than cameras"),
     ("randomization", "random properties of environments"),
+    ("tasks", "tasks for learning agents"),
+    ("views", "windows, browser views and screenshots"),
+    ("recordings", "recordings and live streams"),
 ];
 
 /// The module of a type, by the source file of the type.
 pub(crate) fn area(file: &str) -> &'static str {
-    const PREFIXES: [(&str, &str); 16] = [
+    const PREFIXES: [(&str, &str); 17] = [
         ("scene/src/mesh/", "shapes"),
         ("sim/src/surface_cfg.rs", "shapes"),
         ("sim/src/objects/shape.rs", "shapes"),
@@ -67,6 +85,7 @@ pub(crate) fn area(file: &str) -> &'static str {
         ("sim/src/objects/robot_cfg.rs", "robots"),
         ("sim/src/objects/articulation.rs", "robots"),
         ("sim/src/objects/mjcf_file.rs", "robots"),
+        ("sim/src/inspect/", "robots"),
         ("sim/src/randomization/", "randomization"),
         ("sim/src/objects/", "objects"),
         ("scene/src/terrain/", "objects"),
@@ -76,8 +95,11 @@ pub(crate) fn area(file: &str) -> &'static str {
     ];
     let known = PREFIXES.iter().find(|(prefix, _)| file.starts_with(prefix)).map(|(_, area)| *area);
     known.unwrap_or(match file.split('/').next() {
-        Some("render") => "cameras",
+        Some("render") => "rendering",
         Some("sensors") => "sensors",
+        Some("tasks") => "tasks",
+        Some("viewer") => "views",
+        Some("record") => "recordings",
         _ => "simulation",
     })
 }
@@ -123,9 +145,11 @@ pub(crate) fn structs() -> Vec<Struct> {
         "robot/src/urdf/config.rs" UrdfCfg = new::<robot::urdf::UrdfCfg>(), UrdfCfg;
         "sim/src/objects/mjcf_file.rs" MjcfFile = new::<sim::MjcfFile>(), MjcfFile;
         "sim/src/drive/models/dc_motor.rs" DcMotor = sim::DcMotor { saturation_effort: 1.0 }, DcMotor;
+        "sim/src/drive/models/delayed_pd.rs" DelayedPd = new::<sim::DelayedPd>(), DelayedPd;
         "sim/src/drive/cfg.rs" DriveCfg = new::<sim::DriveCfg>(), DriveCfg;
         "sim/src/objects/robot_cfg.rs" RobotCfg = new::<sim::RobotCfg>(), RobotCfg, "robot";
         "sim/src/objects/articulation.rs" ArticulationCfg = new::<sim::ArticulationCfg>(), ArticulationCfg, "articulation";
+        "sim/src/inspect/mod.rs" InspectCfg = new::<sim::inspect::InspectCfg>(), InspectCfg;
         "sim/src/objects/rigid_object_data.rs" RigidObjectCfg = new::<sim::RigidObjectCfg>(), RigidObjectCfg, "rigid_object";
         "sim/src/objects/object_group_data.rs" RigidObjectGroupCfg = new::<sim::RigidObjectGroupCfg>(), RigidObjectGroupCfg, "rigid_object_group";
         "scene/src/terrain/rough.rs" RoughTerrain = new::<scene::terrain::RoughTerrain>(), RoughTerrain;
@@ -158,10 +182,22 @@ pub(crate) fn structs() -> Vec<Struct> {
         "render/src/request.rs" RasterCfg = new::<render::RasterCfg>(), RasterCfg;
         "render/src/lens/open_cv.rs" OpenCvLens = new::<render::lens::OpenCv>(), OpenCv;
         "render/src/lens/open_cv_fisheye.rs" OpenCvFisheyeLens = new::<render::lens::OpenCvFisheye>(), OpenCvFisheye;
+        "render/src/lens/equidistant.rs" EquidistantLens = new::<render::lens::Equidistant>(), Equidistant;
+        "render/src/lens/equisolid.rs" EquisolidLens = new::<render::lens::Equisolid>(), Equisolid;
+        "render/src/lens/orthographic.rs" OrthographicLens = new::<render::lens::Orthographic>(), Orthographic;
+        "render/src/lens/stereographic.rs" StereographicLens = new::<render::lens::Stereographic>(), Stereographic;
         "render/src/lens/f_theta.rs" FThetaLens = new::<render::lens::FTheta>(), FTheta;
+        "sensors/src/camera/imperfection/vignetting.rs" Vignetting = new::<imperfection::Vignetting>(), Vignetting;
+        "sensors/src/camera/imperfection/exposure.rs" Exposure = new::<imperfection::Exposure>(), Exposure;
+        "sensors/src/camera/imperfection/shot_noise.rs" ShotNoise = new::<imperfection::ShotNoise>(), ShotNoise;
+        "sensors/src/camera/imperfection/read_noise.rs" ReadNoise = new::<imperfection::ReadNoise>(), ReadNoise;
+        "sensors/src/camera/imperfection/holes.rs" Holes = new::<imperfection::Holes>(), Holes;
+        "sensors/src/camera/imperfection/depth_noise.rs" DepthNoise = new::<imperfection::DepthNoise>(), DepthNoise;
+        "sensors/src/camera/imperfection/mod.rs" Imperfections = new::<imperfection::Imperfections>(), Imperfections;
         "sensors/src/camera/extrinsics.rs" Extrinsics = new::<sensors::camera::Extrinsics>(), Extrinsics;
         "sensors/src/camera/cfg.rs" CameraCfg = new::<sensors::camera::CameraCfg>(), CameraCfg, "camera";
         "sensors/src/camera/stereo/cfg.rs" StereoCameraCfg = new::<sensors::camera::StereoCameraCfg>(), StereoCameraCfg, "stereo_camera";
+        "sensors/src/camera/segmentation/labels.rs" SegmentationCfg = new::<sensors::camera::SegmentationCfg>(), SegmentationCfg;
         "sensors/src/ray/pattern/grid.rs" GridPattern = new::<sensors::ray::pattern::Grid>(), Grid;
         "sensors/src/ray/pattern/lidar.rs" LidarPattern = new::<sensors::ray::pattern::Lidar>(), Lidar;
         "sensors/src/ray/pattern/bpearl.rs" BpearlPattern = new::<sensors::ray::pattern::Bpearl>(), Bpearl;
@@ -181,6 +217,15 @@ pub(crate) fn structs() -> Vec<Struct> {
         "robot/src/kinematics/cfg.rs" IkCfg = new::<robot::kinematics::IkCfg>(), IkCfg;
         "sim/src/randomization/terms.rs" RandomizationTerm = example_term(), RandomizationTerm;
         "sim/src/randomization/terms.rs" Randomization = new::<sim::Randomization>(), Randomization;
+        "tasks/src/task_cfg.rs" TaskCfg = new::<tasks::TaskCfg>(), TaskCfg;
+        "viewer/src/scene_view/orbit_camera.rs" OrbitCamera = new::<viewer::OrbitCamera>(), OrbitCamera;
+        "viewer/src/scene_view/overlay.rs" Overlays = new::<viewer::Overlays>(), Overlays;
+        "viewer/src/serve/mod.rs" ServeCfg = new::<viewer::ServeCfg>(), ServeCfg;
+        "viewer/src/window/mod.rs" WindowCfg = new::<viewer::WindowCfg>(), WindowCfg;
+        "viewer/src/screenshot.rs" ScreenshotCfg = new::<viewer::ScreenshotCfg>(), ScreenshotCfg;
+        "record/src/overview.rs" OverviewCfg = new::<record::OverviewCfg>(), OverviewCfg;
+        "record/src/cfg.rs" RecorderCfg = new::<record::RecorderCfg>(), RecorderCfg;
+        "record/src/live.rs" FoxgloveCfg = new::<record::FoxgloveCfg>(), FoxgloveCfg;
     };
     // The tile of a share is required.
     all.iter_mut().filter(|known| known.class == "TileShare").for_each(|share| drop(share.default.remove("tile")));
@@ -213,6 +258,7 @@ pub(crate) const ENUMS: &[Enum] = &[
     Enum { file: "robot/src/urdf/config.rs", name: "NameCase" },
     Enum { file: "sim/src/drive/mod.rs", name: "DriveModel" },
     Enum { file: "render/src/intrinsics.rs", name: "Intrinsics" },
+    Enum { file: "render/src/renderer.rs", name: "Renderer" },
     Enum { file: "sensors/src/camera/extrinsics.rs", name: "Placement" },
     Enum { file: "sensors/src/camera/extrinsics.rs", name: "CameraConvention" },
     Enum { file: "sensors/src/camera/cfg.rs", name: "DepthMiss" },
@@ -224,7 +270,23 @@ pub(crate) const ENUMS: &[Enum] = &[
     Enum { file: "robot/src/kinematics/cfg.rs", name: "IkTask" },
     Enum { file: "sim/src/randomization/property.rs", name: "Property" },
     Enum { file: "sim/src/randomization/terms.rs", name: "RandomizationOp" },
+    Enum { file: "viewer/src/control/mod.rs", name: "Speed" },
+    Enum { file: "viewer/src/scene_view/snapshot.rs", name: "EnvSelection" },
+    Enum { file: "record/src/format.rs", name: "Format" },
 ];
+
+/// Name of an enumeration in Python. `Renderer` is the class of kinetoscope-render.
+pub(crate) fn python_name(name: &str) -> &str {
+    if name == "Renderer" { "CameraRenderer" } else { name }
+}
+
+/// Values of an enumeration whose fields may be left out in files, by variant.
+pub(crate) fn variant_defaults(name: &str) -> Table {
+    match name {
+        "Renderer" => table(&render::Renderer::RAY_TRACED),
+        _ => Table::new(),
+    }
+}
 
 /// Enumerations that macros declare. The tests of the package read each variant.
 pub(crate) const DECLARED_ENUMS: &[DeclaredEnum] = &[
@@ -232,24 +294,53 @@ pub(crate) const DECLARED_ENUMS: &[DeclaredEnum] = &[
         area: "robots",
         name: "DriveType",
         doc: "Meaning of stiffness and damping of drives.",
-        variants: &[("force", None), ("acceleration", None), ("none", None)],
+        variants: &[("force", Declared::Name("")), ("acceleration", Declared::Name("")), ("none", Declared::Name(""))],
+    },
+    DeclaredEnum {
+        area: "robots",
+        name: "ActuatorModel",
+        doc: "An explicit actuator model with its parameters.",
+        variants: &[
+            ("ideal_pd", Declared::Empty("Ideal PD controller with an effort limit.")),
+            ("dc_motor", Declared::Class("DcMotor")),
+            ("delayed_pd", Declared::Class("DelayedPd")),
+        ],
+    },
+    DeclaredEnum {
+        area: "rendering",
+        name: "Lens",
+        doc: "A lens model. The name alone, such as ``\"equidistant\"``, is the lens with its default numbers.",
+        variants: &[
+            ("pinhole", Declared::Name("The pinhole, without distortion: straight lines stay straight.")),
+            ("opencv", Declared::Class("OpenCvLens")),
+            ("opencv_fisheye", Declared::Class("OpenCvFisheyeLens")),
+            ("equidistant", Declared::Class("EquidistantLens")),
+            ("equisolid", Declared::Class("EquisolidLens")),
+            ("orthographic", Declared::Class("OrthographicLens")),
+            ("stereographic", Declared::Class("StereographicLens")),
+            ("ftheta", Declared::Class("FThetaLens")),
+            (
+                "panorama",
+                Declared::Name("The equirectangular panorama: longitudes along rows, latitudes along columns."),
+            ),
+        ],
     },
     DeclaredEnum {
         area: "objects",
         name: "TerrainGenerator",
         doc: "Generator of the heights of a terrain, which also defines its size.",
         variants: &[
-            ("rough", Some("RoughTerrain")),
-            ("slope", Some("SlopeTerrain")),
-            ("pyramid_stairs", Some("PyramidStairsTerrain")),
-            ("flat", Some("FlatTerrain")),
-            ("pyramid_slope", Some("PyramidSlopeTerrain")),
-            ("boxes", Some("BoxesTerrain")),
-            ("stepping_stones", Some("SteppingStonesTerrain")),
-            ("gap", Some("GapTerrain")),
-            ("waves", Some("WavesTerrain")),
-            ("discrete_obstacles", Some("DiscreteObstaclesTerrain")),
-            ("grid", Some("TerrainGrid")),
+            ("rough", Declared::Class("RoughTerrain")),
+            ("slope", Declared::Class("SlopeTerrain")),
+            ("pyramid_stairs", Declared::Class("PyramidStairsTerrain")),
+            ("flat", Declared::Class("FlatTerrain")),
+            ("pyramid_slope", Declared::Class("PyramidSlopeTerrain")),
+            ("boxes", Declared::Class("BoxesTerrain")),
+            ("stepping_stones", Declared::Class("SteppingStonesTerrain")),
+            ("gap", Declared::Class("GapTerrain")),
+            ("waves", Declared::Class("WavesTerrain")),
+            ("discrete_obstacles", Declared::Class("DiscreteObstaclesTerrain")),
+            ("grid", Declared::Class("TerrainGrid")),
         ],
     },
     DeclaredEnum {
@@ -257,11 +348,11 @@ pub(crate) const DECLARED_ENUMS: &[DeclaredEnum] = &[
         name: "RayPattern",
         doc: "Starts and directions of the rays of a ray caster.",
         variants: &[
-            ("grid", Some("GridPattern")),
-            ("lidar", Some("LidarPattern")),
-            ("bpearl", Some("BpearlPattern")),
-            ("pinhole", Some("PinholePattern")),
-            ("custom", Some("CustomPattern")),
+            ("grid", Declared::Class("GridPattern")),
+            ("lidar", Declared::Class("LidarPattern")),
+            ("bpearl", Declared::Class("BpearlPattern")),
+            ("pinhole", Declared::Class("PinholePattern")),
+            ("custom", Declared::Class("CustomPattern")),
         ],
     },
 ];

@@ -5,6 +5,7 @@ use crate::source::snake_case;
 /// Rust names without a counterpart in Python, and their replacements.
 const WORDS: &[(&str, &str)] = &[
     ("ActuatorState", "actuator state"),
+    ("AutoresetMode", "mode of automatic resets"),
     ("Boxes", "``BoxesTerrain``"),
     ("Camera", "camera"),
     ("Camera::history", "``Sensor.history``"),
@@ -14,6 +15,8 @@ const WORDS: &[(&str, &str)] = &[
     ("DriveCfg::default", "``DriveCfg()``"),
     ("EnvId", "Indices of environments"),
     ("FastRayTraced", "``\"fast_ray_traced\"``"),
+    ("Format::LeRobot", "``\"lerobot\"``"),
+    ("FoxgloveServer::url", "``FoxgloveServer.url``"),
     ("FrameTransformer", "frame transformer"),
     ("Gap", "``GapTerrain``"),
     ("IdealPd", "the actuator ``ideal_pd``"),
@@ -29,18 +32,25 @@ const WORDS: &[(&str, &str)] = &[
     ("PyramidStairs", "``PyramidStairsTerrain``"),
     ("RayCaster", "ray caster"),
     ("RayCasterCamera", "ray-caster camera"),
+    ("RecordingSummary::left_out", "``RecordingSummary.left_out``"),
     ("Renderer::Hybrid", "``\"hybrid\"``"),
+    ("Renderer::RAY_TRACED", "``CameraRenderer.ray_traced()``"),
     ("Renderer::Raster", "``\"raster\"``"),
     ("Renderer::RayTraced", "``\"ray_traced\"``"),
+    ("ShotNoise::electrons", "``ShotNoise.electrons``"),
+    ("Holes::max_angle", "``Holes.max_angle``"),
     ("SteppingStones", "``SteppingStonesTerrain``"),
     ("StereoCamera", "stereo camera"),
     ("TipFrame::at", "``link``"),
     ("TipFrame::with_tcp", "the argument ``tcp``"),
+    ("Topic::Everything", "``Topic.everything()``"),
+    ("Topic::Overview", "``Topic.overview()``"),
     ("Waves", "``WavesTerrain``"),
     ("crate::DriveType", "``DriveType``"),
     ("f32", "single precision"),
     ("ground: None", "``ground=None``"),
     ("kinetoscope_scene::terrain", "``TerrainGenerator``"),
+    ("kinetoscope_sim::SimulationManagerCfg::env_origins", "``SimulationManager.env_origins``"),
     ("stiffness: 100.0.into()", "``stiffness=100.0``"),
 ];
 
@@ -63,6 +73,23 @@ const PHRASES: &[(&str, &str)] = &[
     (": see ``super::RandomizationError``", ", which is an error"),
     (": see ``ISAAC``", ""),
     ("the part of ``RenderScene::ambient`` that", "the part of the light from all directions that"),
+    (
+        "is ``RenderScene::ambient``: its sky's radiance from above the horizon, its ground's from below.",
+        "comes from all directions: the sky's radiance from above the horizon, the ground's from below.",
+    ),
+    ("Cameras and mirrors see ``RenderScene::sky`` instead.", "Cameras and mirrors see the sky instead."),
+    ("the seed and ``FrameSample::noise`` only", "the seed and the image only"),
+    ("A factor outside ``FACTOR_RANGE`` is refused.", "It must be from 0.001 to 1000."),
+    (" (``Format::all``)", ""),
+    (" Requires the feature ``lerobot``.", ""),
+    (" (``App::new``)", ""),
+    ("``TermRegistry::names`` lists the types of a kind. ", ""),
+    ("Some keys belong to the kind", "These keys belong to the kind"),
+    (" (``ImageRenderer::exposure_compensation``)", ""),
+    (
+        "The default is ``DepthNoise::KHOSHELHAM``.",
+        "The default is that of a Kinect (Khoshelham and Oude Elberink 2012).",
+    ),
 ];
 
 /// Replaces Rust names. `is_literal` returns true for an enumeration whose values are strings in Python, and `None` for

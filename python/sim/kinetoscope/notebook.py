@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 if TYPE_CHECKING:
-    from ._sim import Sensor, Server
+    from ._sim import Sensor, Server, SimulationManager
 
 MAX_IMAGES = 4
 
@@ -62,6 +62,14 @@ def to_image(values: np.ndarray[Any, Any]) -> np.ndarray[Any, Any] | None:
         ids = values.astype(np.uint32)
         return np.asarray(np.stack([(ids * step) & 255 for step in (97, 57, 23)], axis=-1), dtype=np.uint8)
     return None
+
+
+def simulation_html(sim: SimulationManager) -> str:
+    """Table of the entities of a simulation, with the text of each. It is as safe as the texts: a destroyed simulation and one
+    in use have texts too."""
+    rows = [(name, repr(sim[name])) for name in sim.keys()] if not repr(sim).startswith("<SimulationManager of") else []
+    cells = "".join(f"<tr><td>{html.escape(name)}</td><td>{html.escape(text)}</td></tr>" for name, text in rows)
+    return f"<b>{html.escape(repr(sim))}</b><table>{cells}</table>"
 
 
 def sensor_html(sensor: Sensor) -> str:

@@ -17,7 +17,7 @@ pub(crate) const PYTHON: &str = "<python>";
 
 /// Optional fields that are present by default, so that `None` is the `false` of scene files. A test of the package
 /// compares the list with the classes.
-pub(crate) const NONE_IS_FALSE: [&str; 2] = ["ground", "min_thickness"];
+pub(crate) const NONE_IS_FALSE: [&str; 3] = ["ground", "min_thickness", "speed"];
 
 /// Type of the configuration of a simulation, for [`table`].
 pub(crate) const SIMULATION: &str = "simulation";
@@ -251,7 +251,11 @@ pub(crate) fn default_uid(kind: &str) -> String {
 
 /// Reads a configuration that is not part of scene files. `what` is the name of its class, or of its content.
 pub(crate) fn read<T: DeserializeOwned>(what: &str, cfg: Option<&Bound<'_, PyAny>>) -> PyResult<T> {
-    let fields = table(what, cfg, None)?;
+    of_table(what, table(what, cfg, None)?)
+}
+
+/// Reads the fields of a configuration that is not part of scene files.
+pub(crate) fn of_table<T: DeserializeOwned>(what: &str, fields: Table) -> PyResult<T> {
     let invalid = |error: toml::de::Error| Failure::new(Class::Config, format!("{what}: {}", error.message()));
     Ok(guarded(|| Value::Table(fields).try_into().map_err(invalid))?)
 }

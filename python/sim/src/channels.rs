@@ -17,6 +17,8 @@ pub(crate) enum Instant {
     Current,
     /// Past measurements, newest first, on the second axis.
     History,
+    /// The latest delivered images of a camera.
+    Delivered,
 }
 
 /// Names of all channels of a sensor.
@@ -58,8 +60,9 @@ pub(crate) fn values<'s>(sensor: &'s dyn Sensor, name: &str, instant: Instant) -
     let any: &dyn Any = sensor;
     let unknown = || {
         let known = names(sensor);
-        if instant == Instant::History && known.iter().any(|known| known == name) {
-            return Failure::new(Class::UnknownName, format!("the channel {name:?} of this sensor has no history"));
+        if instant != Instant::Current && known.iter().any(|known| known == name) {
+            let missing = if instant == Instant::History { "no history" } else { "no delivered images" };
+            return Failure::new(Class::UnknownName, format!("the channel {name:?} of this sensor has {missing}"));
         }
         let candidates = closest_names(name, known.iter().map(String::as_str));
         let candidates: Vec<String> = candidates.into_iter().map(|name| format!("{name:?}")).collect();
@@ -74,6 +77,9 @@ pub(crate) fn values<'s>(sensor: &'s dyn Sensor, name: &str, instant: Instant) -
             Some(("right", channel)) => image(camera.right(), channel, instant)?,
             _ if name == "disparity" && instant == Instant::Current && camera.has_disparity() => {
                 Some(camera.disparity()?.into())
+            }
+            _ if name == "disparity" && instant == Instant::Delivered && camera.has_disparity() => {
+                Some(camera.latest_delivered_disparity()?.into())
             }
             _ => None,
         };
@@ -125,6 +131,7 @@ pub(crate) fn values<'s>(sensor: &'s dyn Sensor, name: &str, instant: Instant) -
     Ok(match instant {
         Instant::Current => shaped(sampler.values(name), shape(&[envs])),
         Instant::History => shaped(sampler.history(name), shape(&[envs, past])),
+        Instant::Delivered => return Err(unknown()),
     })
 }
 
@@ -139,6 +146,7 @@ fn image<'s>(camera: &'s Camera, name: &str, instant: Instant) -> Result<Option<
                 return Ok(Some(match instant {
                     Instant::Current => camera.channel::<frame::$Channel>()?.into(),
                     Instant::History => camera.history::<frame::$Channel>()?.into(),
+                    Instant::Delivered => camera.latest_delivered::<frame::$Channel>()?.into(),
                 }));
             })*
         }};

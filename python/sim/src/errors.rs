@@ -2,8 +2,10 @@
 
 use kinetoscope::assets::AssetNotFound;
 use kinetoscope::record::RecordError;
+use kinetoscope::robot::dynamics::DynamicsError;
 use kinetoscope::sensors::SensorError;
 use kinetoscope::sim::Error;
+use kinetoscope::sim::inspect::InspectError;
 use kinetoscope::viewer::{ScreenshotError, ServeError, WindowError};
 use pyo3::prelude::*;
 use std::any::Any;
@@ -189,6 +191,9 @@ classes! {
     ScreenshotError => Viewer,
     AssetNotFound => File,
     toml::ser::Error => Config,
+    serde_json::Error => Internal,
+    InspectError => Model,
+    DynamicsError => Argument,
 }
 
 impl Failure {

@@ -6,8 +6,10 @@
 #![forbid(unsafe_code)]
 
 mod arguments;
+mod calibration;
 mod cfg;
 mod channels;
+mod dynamics;
 mod errors;
 mod html;
 mod objects;
@@ -21,9 +23,11 @@ mod snapshot;
 mod task;
 mod values;
 mod viewer;
+mod viewer_control;
 
 use errors::Failure;
 use pyo3::prelude::*;
+use pyo3::types::PyDict;
 use std::path::PathBuf;
 
 /// Path of a bundled asset such as ``sr5/SR5.urdf``, searched in the folder ``KINETOSCOPE_ASSETS``, then in the package.
@@ -72,15 +76,67 @@ fn _default_uid(kind: &str) -> String {
 /// Default of a configuration that is not part of scene files, as TOML.
 #[pyfunction]
 fn _default_fields(name: &str) -> PyResult<String> {
-    use kinetoscope::robot::kinematics::{IkCfg, NullSpacePosture};
-    let text = shared::guarded(|| match name {
-        "IkCfg" => Ok(toml::to_string(&IkCfg::default())?),
-        "NullSpacePosture" => Ok(toml::to_string(&NullSpacePosture::at(Vec::new()))?),
-        "TerrainGrid" => Ok(toml::to_string(&kinetoscope::scene::terrain::TerrainGrid::default())?),
-        "Randomization" => Ok(toml::to_string(&kinetoscope::sim::Randomization::default())?),
-        other => Err(Failure::new(errors::Class::UnknownName, format!("no default of {other:?}"))),
+    use kinetoscope::{record, robot::kinematics, scene::terrain, sensors::camera, sim, tasks, viewer};
+    macro_rules! defaults {
+        ($($name:literal => $default:expr,)*) => {
+            match name {
+                $($name => Ok(toml::to_string(&$default)?),)*
+                other => Err(Failure::new(errors::Class::UnknownName, format!("no default of {other:?}"))),
+            }
+        };
+    }
+    let text = shared::guarded(|| {
+        defaults! {
+            "IkCfg" => kinematics::IkCfg::default(),
+            "NullSpacePosture" => kinematics::NullSpacePosture::at(Vec::new()),
+            "TerrainGrid" => terrain::TerrainGrid::default(),
+            "Randomization" => sim::Randomization::default(),
+            "SegmentationCfg" => camera::SegmentationCfg::default(),
+            "InspectCfg" => sim::inspect::InspectCfg::default(),
+            "TaskCfg" => tasks::TaskCfg::default(),
+            "OrbitCamera" => viewer::OrbitCamera::default(),
+            "Overlays" => viewer::Overlays::default(),
+            "ServeCfg" => viewer::ServeCfg::default(),
+            "WindowCfg" => viewer::WindowCfg::default(),
+            "ScreenshotCfg" => viewer::ScreenshotCfg::default(),
+            "OverviewCfg" => record::OverviewCfg::default(),
+            "RecorderCfg" => record::RecorderCfg::default(),
+            "FoxgloveCfg" => record::FoxgloveCfg::default(),
+        }
     });
     Ok(text?)
+}
+
+/// Masses, links, joints, mass matrix and gravity torques of a robot at joint positions, without a simulation: a dict of
+/// plain values. ``cfg`` is an ``InspectCfg`` or a dict of its fields; keyword arguments replace fields.
+#[pyfunction]
+#[pyo3(signature = (cfg=None, **fields))]
+fn inspect<'py>(
+    py: Python<'py>,
+    cfg: Option<&Bound<'py, PyAny>>,
+    fields: Option<&Bound<'py, PyDict>>,
+) -> PyResult<Bound<'py, PyAny>> {
+    let mut fields = cfg::table("InspectCfg", cfg, fields)?;
+    // A path in place of a table, as in the configuration of a robot.
+    let path = |value: Option<&toml::Value>| value.and_then(toml::Value::as_str).map(PathBuf::from);
+    let (urdf, mjcf) = (path(fields.get("urdf")), path(fields.get("mjcf")));
+    [("urdf", &urdf), ("mjcf", &mjcf)]
+        .iter()
+        .filter(|(_, path)| path.is_some())
+        .for_each(|(name, _)| drop(fields.remove(*name)));
+    let mut cfg: kinetoscope::sim::inspect::InspectCfg = cfg::of_table("InspectCfg", fields)?;
+    cfg.urdf = urdf.map_or(cfg.urdf, kinetoscope::robot::urdf::UrdfCfg::single);
+    cfg.mjcf = mjcf.map(kinetoscope::sim::MjcfFile::new).or(cfg.mjcf);
+    let text = shared::detached(py, || Ok(serde_json::to_string(&kinetoscope::sim::inspect::inspect(&cfg)?)?))?;
+    py.import("json")?.call_method1("loads", (text,))
+}
+
+/// JSON Schema (draft 7) of scene files, a dict, for completion and checks in editors.
+#[pyfunction]
+fn json_schema(py: Python<'_>) -> PyResult<Bound<'_, PyAny>> {
+    let types = kinetoscope::sim::EntityTypes::default();
+    let text = shared::detached(py, || Ok(kinetoscope::sim::SceneCfg::json_schema(&types).to_string()))?;
+    py.import("json")?.call_method1("loads", (text,))
 }
 
 /// Panics, to test that a panic becomes an ``InternalError``.
@@ -116,9 +172,14 @@ fn _sim(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<recording::FoxgloveServer>()?;
     module.add_class::<viewer::Server>()?;
     module.add_class::<viewer::Window>()?;
+    module.add_class::<viewer_control::Viewer>()?;
     module.add_function(wrap_pyfunction!(asset_path, module)?)?;
     module.add_function(wrap_pyfunction!(bundled_robot, module)?)?;
+    module.add_function(wrap_pyfunction!(inspect, module)?)?;
+    module.add_function(wrap_pyfunction!(json_schema, module)?)?;
+    module.add_function(wrap_pyfunction!(calibration::read_calibration, module)?)?;
     module.add_function(wrap_pyfunction!(mujoco_version, module)?)?;
+    module.add_function(wrap_pyfunction!(recording::recover, module)?)?;
     module.add_function(wrap_pyfunction!(simulation::to_toml, module)?)?;
     module.add_function(wrap_pyfunction!(recording::read_series, module)?)?;
     module.add_function(wrap_pyfunction!(recording::recording_topics, module)?)?;

@@ -11,7 +11,7 @@ use std::sync::Arc;
 
 equal_handles! { RigidObject: id, RigidObjectGroup: id, Terrain: id, MjcfPart: id, Weld: id }
 
-/// A rigid object in all environments. Arrays have the environments on the first axis.
+/// A rigid object in all environments. Arrays are float64 with the environments on the first axis.
 #[pyclass(frozen, module = "kinetoscope")]
 #[derive(Debug)]
 pub(crate) struct RigidObject {
@@ -213,7 +213,7 @@ impl Terrain {
     }
 }
 
-/// An attached MJCF file in all environments.
+/// An attached MJCF file in all environments. Arrays are float64 with the environments on the first axis.
 #[pyclass(frozen, module = "kinetoscope")]
 #[derive(Debug)]
 pub(crate) struct MjcfPart {
@@ -381,7 +381,7 @@ pub(crate) struct Weld {
 }
 
 arrays! { Weld, weld:
-    /// True where the weld holds, shape (num_envs,).
+    /// True where the weld holds, bool, shape (num_envs,).
     is_attached,
 }
 

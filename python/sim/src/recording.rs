@@ -1,12 +1,14 @@
 //! Recordings and replay.
 
 use crate::arguments::envs;
+use crate::cfg;
 use crate::errors::{Class, Failure};
-use crate::shared::{Entity, Shared, detached};
+use crate::shared::{Entity, Shared, detached, guarded};
 use crate::simulation::Simulation;
 use kinetoscope::prelude::Record as _;
 use kinetoscope::record::{
     self, FieldSelector, Format, FoxgloveCfg, OverviewCfg, RecorderCfg, RecorderId, Recording, StreamToFoxglove as _,
+    TimeSeries,
 };
 use kinetoscope::sim::EnvId;
 use numpy::{IntoPyArray, PyArray1};
@@ -90,6 +92,13 @@ impl Topic {
         Self { inner: record::Topic::Channel { sensor, channel } }
     }
 
+    /// Form of the topic in configurations: a text, or a dict with the names.
+    #[getter]
+    fn value<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let text = guarded(|| Ok(serde_json::to_string(&self.inner)?))?;
+        py.import("json")?.call_method1("loads", (text,))
+    }
+
     fn __repr__(&self) -> String {
         format!("Topic({:?})", self.inner)
     }
@@ -120,6 +129,7 @@ pub(crate) struct RecordingSummary {
     waits: u64,
     /// Topics and entities that were left out, each with the reason.
     left_out: Vec<String>,
+    /// All of this in words.
     text: String,
 }
 
@@ -161,6 +171,15 @@ impl Recorder {
         self.finish_once(py)
     }
 
+    /// Error that stopped the recording, or None. ``finish`` raises it too.
+    #[getter]
+    fn failure(&self, py: Python<'_>) -> PyResult<Option<String>> {
+        if self.finished.load(Ordering::Relaxed) {
+            return Ok(None);
+        }
+        self.shared.read(py, |sim| Ok(sim.observers().get(self.id)?.failure()))
+    }
+
     /// Writes a text into the recording, about one environment or all.
     #[pyo3(signature = (text, env=None))]
     fn note(&self, py: Python<'_>, text: &str, env: Option<usize>) -> PyResult<()> {
@@ -189,42 +208,47 @@ impl Recorder {
 
 #[pymethods]
 impl Simulation {
-    /// Begins a recording; its format follows from the extension of the path. Keyword arguments are the fields of the
-    /// Rust ``RecorderCfg``.
-    #[pyo3(signature = (path, topics=None, *, format=None, env_ids=None, period_steps=1, stream_periods=None, scene=true,
-        overview_size=None, overview_fps=None, task=None, use_videos=true, overwrite=false))]
+    /// Begins a recording; its format follows from the extension of the path. ``path`` is a path, or a ``RecorderCfg``.
+    /// Keyword arguments replace its fields, ``env_ids`` the field ``envs``, and the last two those of ``overview``.
+    #[pyo3(signature = (path, topics=None, *, format=None, env_ids=None, period_steps=None, stream_periods=None,
+        scene=None, task=None, use_videos=None, overwrite=None, overview=None, overview_size=None, overview_fps=None))]
     #[expect(clippy::too_many_arguments, reason = "keyword arguments of a Python method")]
     fn record(
         &self,
         py: Python<'_>,
-        path: PathBuf,
+        path: &Bound<'_, PyAny>,
         topics: Option<&Bound<'_, PyAny>>,
         format: Option<&str>,
         env_ids: Option<&Bound<'_, PyAny>>,
-        period_steps: u64,
+        period_steps: Option<u64>,
         stream_periods: Option<&Bound<'_, PyAny>>,
-        scene: bool,
+        scene: Option<bool>,
+        task: Option<String>,
+        use_videos: Option<bool>,
+        overwrite: Option<bool>,
+        overview: Option<&Bound<'_, PyAny>>,
         overview_size: Option<[usize; 2]>,
         overview_fps: Option<f64>,
-        task: Option<String>,
-        use_videos: bool,
-        overwrite: bool,
     ) -> PyResult<Recorder> {
-        let defaults = RecorderCfg::default();
-        let cfg = RecorderCfg {
-            path: path.clone(),
-            format: format.map(format_of).transpose()?,
-            topics: topics.map_or(Ok(defaults.topics.clone()), topics_of)?,
-            envs: envs(&self.shared, env_ids)?,
-            period_steps,
-            stream_periods: stream_periods.map_or(Ok(Vec::new()), periods_of)?,
-            scene,
-            overview: overview(&defaults.overview, overview_size, overview_fps),
-            task: task.unwrap_or_default(),
-            use_videos,
-            overwrite,
-            ..defaults
+        let base = match path.extract::<PathBuf>() {
+            Ok(path) => RecorderCfg::new(path),
+            Err(_) => cfg::read("RecorderCfg", Some(path))?,
         };
+        let cfg = RecorderCfg {
+            format: format.map(format_of).transpose()?.or(base.format),
+            topics: topics.map_or(Ok(base.topics), topics_of)?,
+            envs: envs(&self.shared, env_ids)?.or(base.envs),
+            period_steps: period_steps.unwrap_or(base.period_steps),
+            stream_periods: stream_periods.map_or(Ok(base.stream_periods), periods_of)?,
+            scene: scene.unwrap_or(base.scene),
+            overview: overview_cfg(base.overview, overview, overview_size, overview_fps)?,
+            task: task.unwrap_or(base.task),
+            use_videos: use_videos.unwrap_or(base.use_videos),
+            overwrite: overwrite.unwrap_or(base.overwrite),
+            path: base.path,
+            packets: base.packets,
+        };
+        let path = cfg.path.clone();
         let id = self.shared.write_with_threads(py, |sim| Ok(sim.record(cfg)?))?;
         Ok(Recorder { shared: Arc::clone(&self.shared), id, path, finished: AtomicBool::new(false) })
     }
@@ -289,40 +313,54 @@ impl FoxgloveServer {
 
 #[pymethods]
 impl Simulation {
-    /// Streams topics to Foxglove while the simulation steps; port 0 selects a free port. An address such as
-    /// ``"0.0.0.0:8765"`` lets other machines read them, with the token that is part of ``url``. Keyword arguments are the fields of the
-    /// Rust ``FoxgloveCfg``.
-    #[pyo3(signature = (address="127.0.0.1:8765", topics=None, *, env_ids=None, period_steps=1, stream_periods=None,
+    /// Streams topics to Foxglove while the simulation steps. ``address`` is an address, ``"127.0.0.1:8765"`` by default, or
+    /// a ``FoxgloveCfg``; port 0 selects a free port. An address such as ``"0.0.0.0:8765"`` lets other machines read, with
+    /// the token that is part of ``url``. Keyword arguments are those of ``record``.
+    #[pyo3(signature = (address=None, topics=None, *, env_ids=None, period_steps=None, stream_periods=None, overview=None,
         overview_size=None, overview_fps=None))]
     #[expect(clippy::too_many_arguments, reason = "keyword arguments of a Python method")]
     fn stream_to_foxglove(
         &self,
         py: Python<'_>,
-        address: &str,
+        address: Option<&Bound<'_, PyAny>>,
         topics: Option<&Bound<'_, PyAny>>,
         env_ids: Option<&Bound<'_, PyAny>>,
-        period_steps: u64,
+        period_steps: Option<u64>,
         stream_periods: Option<&Bound<'_, PyAny>>,
+        overview: Option<&Bound<'_, PyAny>>,
         overview_size: Option<[usize; 2]>,
         overview_fps: Option<f64>,
     ) -> PyResult<FoxgloveServer> {
-        let defaults = FoxgloveCfg::at(address).map_err(Failure::from)?;
+        let base = match address {
+            None => FoxgloveCfg::default(),
+            Some(address) => match address.cast::<PyString>() {
+                Ok(text) => FoxgloveCfg::at(text.to_str()?).map_err(Failure::from)?,
+                Err(_) => cfg::read("FoxgloveCfg", Some(address))?,
+            },
+        };
         let cfg = FoxgloveCfg {
-            topics: topics.map_or(Ok(defaults.topics.clone()), topics_of)?,
-            envs: envs(&self.shared, env_ids)?,
-            period_steps,
-            stream_periods: stream_periods.map_or(Ok(Vec::new()), periods_of)?,
-            overview: overview(&defaults.overview, overview_size, overview_fps),
-            ..defaults
+            topics: topics.map_or(Ok(base.topics), topics_of)?,
+            envs: envs(&self.shared, env_ids)?.or(base.envs),
+            period_steps: period_steps.unwrap_or(base.period_steps),
+            stream_periods: stream_periods.map_or(Ok(base.stream_periods), periods_of)?,
+            overview: overview_cfg(base.overview, overview, overview_size, overview_fps)?,
+            address: base.address,
+            websites: base.websites,
         };
         let inner = self.shared.write_with_threads(py, |sim| Ok(sim.stream_to_foxglove(cfg)?))?;
         Ok(FoxgloveServer { shared: Arc::clone(&self.shared), inner })
     }
 }
 
-/// Settings of an overview image, with those that are given.
-fn overview(defaults: &OverviewCfg, size: Option<[usize; 2]>, fps: Option<f64>) -> OverviewCfg {
-    OverviewCfg { size: size.unwrap_or(defaults.size), fps: fps.unwrap_or(defaults.fps), ..defaults.clone() }
+/// Settings of an overview image: those of a configuration, replaced by the ones that are given.
+fn overview_cfg(
+    base: OverviewCfg,
+    given: Option<&Bound<'_, PyAny>>,
+    size: Option<[usize; 2]>,
+    fps: Option<f64>,
+) -> PyResult<OverviewCfg> {
+    let cfg = given.map_or(Ok(base), |given| cfg::read("OverviewCfg", Some(given)))?;
+    Ok(OverviewCfg { size: size.unwrap_or(cfg.size), fps: fps.unwrap_or(cfg.fps), ..cfg })
 }
 
 /// Topics of an argument: one, or a sequence of them.
@@ -414,10 +452,16 @@ impl Playback {
         self.sim.clone_ref(py)
     }
 
-    /// Times of the frames [s].
+    /// Times of the frames [s], shape (frames,).
     #[getter]
     fn times<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         py.detach(|| self.lock().times().to_vec()).into_pyarray(py)
+    }
+
+    /// Names of the joints that the recording has no positions of; they stay where they were.
+    #[getter]
+    fn joints_without_data(&self, py: Python<'_>) -> Vec<String> {
+        py.detach(|| self.lock().joints_without_data().to_vec())
     }
 
     /// Shows a frame, by its index in ``times``.
@@ -456,23 +500,41 @@ impl Playback {
     }
 }
 
-/// Times and values of a number in a recording.
+/// Times [s] and values of a number in a recording, shape (rows,) each. Of a list of fields, a list of such pairs, read in one
+/// pass.
 #[pyfunction]
 #[pyo3(signature = (path, topic, field, env=None))]
 pub(crate) fn read_series<'py>(
     py: Python<'py>,
     path: PathBuf,
     topic: &str,
-    field: &str,
+    field: &Bound<'py, PyAny>,
     env: Option<usize>,
-) -> PyResult<[Bound<'py, PyArray1<f64>>; 2]> {
+) -> PyResult<Bound<'py, PyAny>> {
+    let single = field.is_instance_of::<PyString>();
+    let fields: Vec<String> = if single { vec![field.extract()?] } else { field.extract()? };
     let series = detached(py, || {
         let recording = Recording::open(path)?;
         let topic = recording.topic(topic, env)?.name.clone();
-        Ok(recording.time_series(&[FieldSelector::new(topic, field)])?)
+        let selectors: Vec<_> = fields.iter().map(|field| FieldSelector::new(topic.clone(), field)).collect();
+        Ok(recording.time_series(&selectors)?)
     })?;
-    let first = series.into_iter().next().unwrap_or_default();
-    Ok([first.times.into_pyarray(py), first.values.into_pyarray(py)])
+    let pair = |series: TimeSeries| [series.times.into_pyarray(py), series.values.into_pyarray(py)];
+    if single {
+        let first = series.into_iter().next().unwrap_or_default();
+        return Ok(pair(first).into_pyobject(py)?.into_any());
+    }
+    Ok(series.into_iter().map(pair).collect::<Vec<_>>().into_pyobject(py)?.into_any())
+}
+
+/// Makes a complete MCAP file from the partial file of a recording that was killed. ``path`` is the intended path of the
+/// recording, without ``.part``; the new file is ``to``, by default ``path``. Returns the number of messages, and damage of the
+/// partial file other than an incomplete end, or None.
+#[pyfunction]
+#[pyo3(signature = (path, to=None))]
+pub(crate) fn recover(py: Python<'_>, path: PathBuf, to: Option<PathBuf>) -> PyResult<(u64, Option<String>)> {
+    let recovered = detached(py, || Ok(record::recover_to(&path, to.as_ref().unwrap_or(&path))?))?;
+    Ok((recovered.messages, recovered.damage))
 }
 
 /// Names of the topics of a recording, each with the names of its numbers.

@@ -17,9 +17,9 @@ use std::sync::Arc;
 
 /// A robot or a passive articulation in all environments.
 ///
-/// Arrays have the environments on the first axis. Methods that write take one row for each of ``env_ids`` (all
-/// environments if omitted), or one row for all of them, and one column for each of ``joint_ids``: indices, the name of
-/// a control part, or a list of patterns of joint names.
+/// Arrays have the environments on the first axis, and are float64 unless another type is given. Methods that write take
+/// one row for each of ``env_ids`` (all environments if omitted), or one row for all of them, and one column for each of
+/// ``joint_ids``: indices, the name of a control part, or a list of patterns of joint names.
 #[pyclass(frozen, module = "kinetoscope", name = "Robot")]
 #[derive(Debug)]
 pub(crate) struct Robot {
@@ -152,7 +152,7 @@ arrays! { Robot, robot:
     stiffness,
     /// Damping of the drives, shape (num_envs, dof).
     damping,
-    /// Delays of the drives [steps], shape (num_envs, dof).
+    /// Delays of the drives [steps], uint32, shape (num_envs, dof).
     delay,
     /// Dry friction of the joints [N m or N], shape (num_envs, dof).
     friction,
@@ -162,7 +162,7 @@ arrays! { Robot, robot:
     armature,
     /// External forces and torques on the links, shape (num_envs, links, 6).
     external_wrenches,
-    /// True where gravity of a link is compensated, shape (num_envs, links).
+    /// True where gravity of a link is compensated, bool, shape (num_envs, links).
     gravity_compensation,
 }
 

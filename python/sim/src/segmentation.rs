@@ -27,13 +27,19 @@ pub(crate) struct Segmentation {
 #[pymethods]
 impl Simulation {
     /// Segmentation of mask images by instance, link and semantic class. ``labels`` is a dict of classes by pattern of
-    /// names: ``{"arm": "manipulator", "cube_.*": "target"}``; other entities keep their own class. Call it again after
-    /// entities were added.
+    /// names, ``{"arm": "manipulator", "cube_.*": "target"}``, or a ``SegmentationCfg``; other entities keep their own class.
+    /// Call it again after entities were added.
     #[pyo3(signature = (labels=None))]
     fn segmentation(&self, py: Python<'_>, labels: Option<&Bound<'_, PyAny>>) -> PyResult<Segmentation> {
-        let fields = PyDict::new(py);
-        labels.map_or(Ok(()), |labels| fields.set_item("labels", labels))?;
-        let cfg: camera::SegmentationCfg = cfg::read("segmentation", Some(fields.as_any()))?;
+        let cfg: camera::SegmentationCfg = match labels {
+            None => camera::SegmentationCfg::default(),
+            Some(cfg) if cfg.hasattr("__dataclass_fields__")? => cfg::read("SegmentationCfg", Some(cfg))?,
+            Some(labels) => {
+                let fields = PyDict::new(py);
+                fields.set_item("labels", labels)?;
+                cfg::read("SegmentationCfg", Some(fields.as_any()))?
+            }
+        };
         let inner = self.shared.write(py, |sim| {
             sim.scene_mut().visual_scene();
             Ok(sim.scene().segmentation(&cfg)?)

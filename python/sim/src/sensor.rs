@@ -5,7 +5,7 @@ use crate::channels::{Instant, names, values};
 use crate::errors::Failure;
 use crate::shared::{Shared, equal_handles};
 use crate::values::{Values, read_into};
-use kinetoscope::ndarray::{Array2, ArrayD, Ix2, IxDyn};
+use kinetoscope::ndarray::{Array2, ArrayD, ArrayView1, Ix2, IxDyn};
 use kinetoscope::prelude::Intrinsics;
 use kinetoscope::sensors::camera::{Camera, CameraConvention, CameraPlacement, PointFrame, StereoCamera};
 use kinetoscope::sensors::ray::{RayCaster, RayCasterCamera};
@@ -100,7 +100,8 @@ impl Sensor {
         self.value(py, channel, Instant::Current).map(|values| values.into_python(py))
     }
 
-    /// Current values of a channel. With ``out``, they are copied into that array, which is returned.
+    /// Current values of a channel, shape (num_envs, ...). With ``out``, they are copied into that array, which is returned:
+    /// it has the same shape and element type.
     #[pyo3(signature = (channel, out=None))]
     fn read<'py>(&self, py: Python<'py>, channel: &str, out: Option<Bound<'py, PyAny>>) -> PyResult<Bound<'py, PyAny>> {
         let Some(out) = out else { return self.__getitem__(py, channel) };
@@ -110,7 +111,7 @@ impl Sensor {
         Ok(out)
     }
 
-    /// Past values of a channel, newest first on the second axis.
+    /// Past values of a channel, newest first on the second axis: the shape is (num_envs, history, ...).
     fn history<'py>(&self, py: Python<'py>, channel: &str) -> PyResult<Bound<'py, PyAny>> {
         self.value(py, channel, Instant::History).map(|values| values.into_python(py))
     }
@@ -254,18 +255,7 @@ impl Sensor {
         env_ids: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<()> {
         let (rows, env_ids) = (array::<Ix2>(intrinsics, "set_intrinsics")?, env_indices(&self.shared, env_ids)?);
-        if rows.ncols() != 4 {
-            return Err(Failure::argument(
-                "set_intrinsics",
-                format!("shape {:?}; expected rows fx fy cx cy", rows.shape()),
-            )
-            .into());
-        }
-        let rows: Vec<Intrinsics> = rows
-            .rows()
-            .into_iter()
-            .map(|row| Intrinsics::Pixels { fx: row[0], fy: row[1], cx: row[2], cy: row[3] })
-            .collect();
+        let rows = intrinsics_of(&rows, "set_intrinsics")?;
         self.shared.write(py, |sim| {
             for_camera!(sim, &self.uid, |camera| camera.set_intrinsics(&rows, env_ids.as_deref())?);
             Ok(())
@@ -395,9 +385,19 @@ impl Sensor {
 }
 
 impl Sensor {
-    fn value(&self, py: Python<'_>, channel: &str, instant: Instant) -> PyResult<Values<'static>> {
+    pub(crate) fn value(&self, py: Python<'_>, channel: &str, instant: Instant) -> PyResult<Values<'static>> {
         self.shared.read(py, |sim| Ok(values(sim.entities().sensor_by_uid(&self.uid)?, channel, instant)?.into_owned()))
     }
+}
+
+/// Intrinsics of rows fx fy cx cy [pixels].
+pub(crate) fn intrinsics_of(rows: &Array2<f64>, name: &str) -> PyResult<Vec<Intrinsics>> {
+    if rows.ncols() != 4 {
+        let problem = format!("shape {:?}; expected rows fx fy cx cy", rows.shape());
+        return Err(Failure::argument(name, problem).into());
+    }
+    let row = |row: ArrayView1<'_, f64>| Intrinsics::Pixels { fx: row[0], fy: row[1], cx: row[2], cy: row[3] };
+    Ok(rows.rows().into_iter().map(row).collect())
 }
 
 pub(crate) fn id_of<S: kinetoscope::sensors::Sensor>(sim: &SimulationManager, uid: &str) -> Option<SensorId<S>> {

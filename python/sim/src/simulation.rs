@@ -500,6 +500,12 @@ impl Simulation {
             Ok(format!("<SimulationManager: {} envs, dt {} s, {names}>", sim.num_envs(), sim.cfg().physics_dt))
         })
     }
+
+    /// Table of the entities, for notebooks.
+    fn _repr_html_(slf: &Bound<'_, Self>) -> PyResult<Py<PyAny>> {
+        let py = slf.py();
+        py.import("kinetoscope.notebook")?.getattr("simulation_html")?.call1((slf,)).map(Bound::unbind)
+    }
 }
 
 impl Simulation {

@@ -32,7 +32,7 @@ impl Snapshot {
         self.inner.env_ids().into_iter().map(|env| env.0).collect()
     }
 
-    /// Simulation times of the environments [s].
+    /// Simulation times of the environments [s], shape (num_envs,).
     #[getter]
     fn time<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         self.inner.time().into_pyarray(py)

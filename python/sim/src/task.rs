@@ -18,7 +18,7 @@ use std::sync::Arc;
 
 /// A task for learning agents in the environments of a simulation.
 ///
-/// ``cfg`` is a dict: ``decimation`` (physics steps in a step), ``episode_steps`` (limit of an episode), ``autoreset``
+/// ``cfg`` is a ``TaskCfg`` or a dict of its fields: ``decimation`` (physics steps in a step), ``episode_steps`` (limit of an episode), ``autoreset``
 /// ("next_step", "same_step" or "disabled", as in Gymnasium), and the terms ``actions``, ``commands``, ``curricula``,
 /// ``events``, ``rewards`` and ``terminations``, dicts by name whose ``type`` is the name of a ready-made term of Rust.
 /// ``observations`` is a dict of groups of terms; the group ``policy`` is that of ``reset`` and ``step``. ``dtype`` is
@@ -86,7 +86,7 @@ impl Task {
                 return Err(Failure::argument("dtype", problem).into());
             }
         };
-        let cfg: TaskCfg = cfg::read("task", Some(cfg))?;
+        let cfg: TaskCfg = cfg::read("TaskCfg", Some(cfg))?;
         let shared = sim.get().shared.clone();
         let number = shared.start_task(py, |sim| build(sim, &cfg))?;
         Ok(Self { shared, number, is_single })

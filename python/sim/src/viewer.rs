@@ -1,5 +1,6 @@
 //! Windows, browser views and screenshots.
 
+use crate::cfg;
 use crate::errors::Failure;
 use crate::shared::Shared;
 use crate::simulation::Simulation;
@@ -10,6 +11,10 @@ use kinetoscope::viewer::{EnvSelection, OrbitCamera, ScreenshotCfg, ServeCfg, Se
 use pyo3::prelude::*;
 use std::path::PathBuf;
 use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+/// Longest wait before signals are handled.
+const SIGNAL_INTERVAL: Duration = Duration::from_millis(50);
 
 /// A browser view of a simulation.
 #[pyclass(frozen, module = "kinetoscope")]
@@ -65,6 +70,32 @@ impl Window {
         self.inner.frame_count()
     }
 
+    /// Waits until the window is closed, at most ``timeout`` seconds, and returns True if it is. The user, a call of
+    /// ``close`` or the end of the simulation closes it.
+    #[pyo3(signature = (timeout=None))]
+    fn wait(&self, py: Python<'_>, timeout: Option<f64>) -> PyResult<bool> {
+        let longest = match timeout {
+            None => Duration::MAX,
+            Some(seconds) => Duration::try_from_secs_f64(seconds.max(0.0))
+                .map_err(|_| Failure::argument("timeout", format!("{seconds} is not a time in seconds")))?,
+        };
+        let started = Instant::now();
+        // In short waits, so that Ctrl+C ends the call.
+        while let Some(left) = longest.checked_sub(started.elapsed()) {
+            if py.detach(|| self.inner.wait(left.min(SIGNAL_INTERVAL))).is_some() {
+                return Ok(true);
+            }
+            py.check_signals()?;
+        }
+        Ok(!self.inner.is_open())
+    }
+
+    /// Error that closed the window, such as a lost display; None if it is open or was closed as intended.
+    #[getter]
+    fn failure(&self) -> Option<String> {
+        self.inner.closed().and_then(|closed| closed.error().map(String::from))
+    }
+
     /// Requests the window to close, without waiting.
     fn close(&self) {
         self.inner.close();
@@ -77,10 +108,11 @@ impl Window {
 
 #[pymethods]
 impl Simulation {
-    /// Serves the simulation to browsers; port 0 selects a free port. ``speed`` is simulated seconds per second, or
-    /// None for no limit. ``allow_local_frames`` lets web pages of this machine show the view in a frame, as notebooks do.
+    /// Serves the simulation to browsers; port 0 selects a free port. ``cfg`` is a ``ServeCfg``; keyword arguments replace
+    /// its fields. ``speed`` is simulated seconds per second. ``allow_local_frames`` lets web pages of this machine show the
+    /// view in a frame, as notebooks do.
     #[pyo3(signature = (address="127.0.0.1:0", *, speed=None, max_fps=None, max_viewers=None, jpeg_quality=None,
-        allow_local_frames=false))]
+        allow_local_frames=None, cfg=None))]
     #[expect(clippy::too_many_arguments, reason = "keyword arguments of a Python method")]
     fn serve(
         &self,
@@ -90,24 +122,29 @@ impl Simulation {
         max_fps: Option<f64>,
         max_viewers: Option<usize>,
         jpeg_quality: Option<u8>,
-        allow_local_frames: bool,
+        allow_local_frames: Option<bool>,
+        cfg: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Server> {
-        let defaults = ServeCfg::default();
+        let base = match cfg {
+            None => ServeCfg::default(),
+            Some(cfg) => cfg::of_table("ServeCfg", speed_table("ServeCfg", cfg)?.0)?,
+        };
         let cfg = ServeCfg {
-            speed: speed.map(Speed::Factor),
-            max_fps: max_fps.unwrap_or(defaults.max_fps),
-            max_viewers: max_viewers.unwrap_or(defaults.max_viewers),
-            jpeg_quality: jpeg_quality.unwrap_or(defaults.jpeg_quality),
-            allow_local_frames,
-            ..defaults
+            speed: speed.map(Speed::Factor).or(base.speed),
+            max_fps: max_fps.unwrap_or(base.max_fps),
+            max_viewers: max_viewers.unwrap_or(base.max_viewers),
+            jpeg_quality: jpeg_quality.unwrap_or(base.jpeg_quality),
+            allow_local_frames: allow_local_frames.unwrap_or(base.allow_local_frames),
+            ..base
         };
         let inner = self.shared.write_with_threads(py, |sim| Ok(sim.serve_with(address, cfg)?))?;
         Ok(Server { shared: Arc::clone(&self.shared), inner })
     }
 
     /// Opens a window that shows the simulation while it steps, in real time unless ``speed`` is another factor, or
-    /// None for no limit. Raises ``ViewerError`` without a display.
-    #[pyo3(signature = (title=None, size=None, *, speed=1.0, display=None))]
+    /// None for no limit. ``cfg`` is a ``WindowCfg``, in place of the other arguments. Raises ``ViewerError`` without a
+    /// display.
+    #[pyo3(signature = (title=None, size=None, *, speed=1.0, display=None, cfg=None))]
     fn open_window(
         &self,
         py: Python<'_>,
@@ -115,33 +152,48 @@ impl Simulation {
         size: Option<[usize; 2]>,
         speed: Option<f64>,
         display: Option<String>,
+        cfg: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Window> {
-        let defaults = WindowCfg::default();
-        let cfg = WindowCfg {
-            title: title.unwrap_or(defaults.title),
-            size: size.unwrap_or(defaults.size),
-            speed: Some(speed.map_or(Speed::Unlimited, Speed::Factor)),
-            display,
-            ..WindowCfg::default()
+        let cfg = if let Some(cfg) = cfg {
+            if title.is_some() || size.is_some() || display.is_some() || speed != Some(1.0) {
+                return Err(Failure::argument("open_window", "give cfg or the other arguments, not both").into());
+            }
+            let (table, keeps_speed) = speed_table("WindowCfg", cfg)?;
+            let cfg: WindowCfg = cfg::of_table("WindowCfg", table)?;
+            if keeps_speed { WindowCfg { speed: None, ..cfg } } else { cfg }
+        } else {
+            let defaults = WindowCfg::default();
+            WindowCfg {
+                title: title.unwrap_or(defaults.title),
+                size: size.unwrap_or(defaults.size),
+                speed: Some(speed.map_or(Speed::Unlimited, Speed::Factor)),
+                display,
+                ..WindowCfg::default()
+            }
         };
         let inner = self.shared.write_with_threads(py, |sim| Ok(sim.open_window_with(cfg)?))?;
         Ok(Window { inner })
     }
 
-    /// Image of all environments, or of one, RGBA, shape (height, width, 4). With a path, a PNG file is written
-    /// instead. ``eye`` and ``target`` place the camera [m].
-    #[pyo3(signature = (path=None, *, size=[960, 540], env=None, eye=None, target=None))]
+    /// Image of all environments, or of one, RGBA, uint8, shape (height, width, 4). With a path, a PNG file is written
+    /// instead. ``eye`` and ``target`` place the camera [m]. ``cfg`` is a ``ScreenshotCfg``; the other arguments replace its
+    /// fields.
+    #[pyo3(signature = (path=None, *, size=None, env=None, eye=None, target=None, cfg=None))]
+    #[expect(clippy::too_many_arguments, reason = "keyword arguments of a Python method")]
     fn screenshot<'py>(
         &self,
         py: Python<'py>,
         path: Option<PathBuf>,
-        size: [usize; 2],
+        size: Option<[usize; 2]>,
         env: Option<usize>,
         eye: Option<[f64; 3]>,
         target: Option<[f64; 3]>,
+        cfg: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Option<Bound<'py, PyAny>>> {
+        let base: ScreenshotCfg =
+            cfg.map_or(Ok(ScreenshotCfg::default()), |cfg| cfg::read("ScreenshotCfg", Some(cfg)))?;
         let camera = match (eye, target) {
-            (None, None) => None,
+            (None, None) => base.camera,
             (Some(eye), Some(target)) => {
                 let camera = OrbitCamera::look_at(eye, target);
                 Some(
@@ -151,8 +203,8 @@ impl Simulation {
             }
             _ => return Err(Failure::argument("screenshot", "give both eye and target, or neither").into()),
         };
-        let envs = env.map_or(EnvSelection::All, EnvSelection::One);
-        let cfg = ScreenshotCfg { size, camera, envs, ..ScreenshotCfg::default() };
+        let envs = env.map_or(base.envs, EnvSelection::One);
+        let cfg = ScreenshotCfg { size: size.unwrap_or(base.size), camera, envs, ..base };
         let image = self.shared.write(py, |sim| {
             if let Some(path) = &path {
                 sim.screenshot_with(path, &cfg)?;
@@ -171,8 +223,18 @@ impl Simulation {
     #[pyo3(signature = (width=960, height=540))]
     fn show(slf: &Bound<'_, Self>, width: u32, height: u32) -> PyResult<Py<PyAny>> {
         let py = slf.py();
-        let server = slf.get().serve(py, "127.0.0.1:0", None, None, None, None, true)?;
+        let server = slf.get().serve(py, "127.0.0.1:0", None, None, None, None, Some(true), None)?;
         let frame = py.import("kinetoscope.notebook")?.getattr("Frame")?;
         frame.call1((server, width, height)).map(Bound::unbind)
     }
+}
+
+/// Fields of a configuration with a speed, and true if the speed is None, which a table cannot contain.
+fn speed_table(class: &str, cfg: &Bound<'_, PyAny>) -> PyResult<(toml::Table, bool)> {
+    let mut table = cfg::table(class, Some(cfg), None)?;
+    let is_none = table.get("speed").and_then(toml::Value::as_bool) == Some(false);
+    if is_none {
+        table.remove("speed");
+    }
+    Ok((table, is_none))
 }

@@ -96,46 +96,61 @@ class TerrainGenerator:
 
     @staticmethod
     def rough(value: RoughTerrain | Mapping[str, Any]) -> dict[str, Any]:
+        """Terrain with independent random heights at its points."""
         return {"rough": value}
 
     @staticmethod
     def slope(value: SlopeTerrain | Mapping[str, Any]) -> dict[str, Any]:
+        """An inclined plane: height 0 at the center, rising along x and y."""
         return {"slope": value}
 
     @staticmethod
     def pyramid_stairs(value: PyramidStairsTerrain | Mapping[str, Any]) -> dict[str, Any]:
+        """Stairs from all four sides up (or down) to a platform at the center, which is square if the field is."""
         return {"pyramid_stairs": value}
 
     @staticmethod
     def flat(value: FlatTerrain | Mapping[str, Any]) -> dict[str, Any]:
+        """Flat ground at height 0, as a height field."""
         return {"flat": value}
 
     @staticmethod
     def pyramid_slope(value: PyramidSlopeTerrain | Mapping[str, Any]) -> dict[str, Any]:
+        """Slopes from all four sides up (or down) to a platform at the center, which is square if the field is."""
         return {"pyramid_slope": value}
 
     @staticmethod
     def boxes(value: BoxesTerrain | Mapping[str, Any]) -> dict[str, Any]:
+        """A grid of square boxes with independent random heights, and a platform of height 0 at the center."""
         return {"boxes": value}
 
     @staticmethod
     def stepping_stones(value: SteppingStonesTerrain | Mapping[str, Any]) -> dict[str, Any]:
+        """A grid of square stones over a deep ground, and a platform of height 0 at the center."""
         return {"stepping_stones": value}
 
     @staticmethod
     def gap(value: GapTerrain | Mapping[str, Any]) -> dict[str, Any]:
+        """A square trench around a platform at the center: the robot on the platform has to step across."""
         return {"gap": value}
 
     @staticmethod
     def waves(value: WavesTerrain | Mapping[str, Any]) -> dict[str, Any]:
+        """Waves along x and y: the height is ``amplitude`` (sin(2 pi ``waves`` x / length) + sin(2 pi ``waves`` y /
+        width)) / 2, with x and y from the negative ends.
+        """
         return {"waves": value}
 
     @staticmethod
     def discrete_obstacles(value: DiscreteObstaclesTerrain | Mapping[str, Any]) -> dict[str, Any]:
+        """Rectangular obstacles at random places on flat ground, and a free platform at the center."""
         return {"discrete_obstacles": value}
 
     @staticmethod
     def grid(value: TerrainGrid | Mapping[str, Any]) -> dict[str, Any]:
+        """A grid of terrain tiles: a type for each column, a difficulty for each row, for curricula of walking
+        robots.
+        """
         return {"grid": value}
 
 
@@ -616,7 +631,6 @@ class TerrainCfg:
 
     Contact sensors treat it as part of the ``world``. ``TerrainGenerator`` has generators of heights. The ground plane
     at z = 0 hides everything below it: leave the plane out (``ground=None``) or place the terrain above it.
-
 
     In a file, ``heights`` is a list of rows with ``size`` beside it, or a generator: ``heights.rough = { seed = 7 }``.
     Files are always written with rows, each number with all its digits.

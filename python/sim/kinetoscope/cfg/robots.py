@@ -83,6 +83,27 @@ DriveType: TypeAlias = Literal["force", "acceleration", "none"]
 """Meaning of stiffness and damping of drives."""
 
 
+class ActuatorModel:
+    """An explicit actuator model with its parameters."""
+
+    @staticmethod
+    def ideal_pd() -> dict[str, Any]:
+        """Ideal PD controller with an effort limit."""
+        return {"ideal_pd": {}}
+
+    @staticmethod
+    def dc_motor(value: DcMotor | Mapping[str, Any]) -> dict[str, Any]:
+        """DC motor with a gear, as in Isaac Lab 2."""
+        return {"dc_motor": value}
+
+    @staticmethod
+    def delayed_pd(value: DelayedPd | Mapping[str, Any]) -> dict[str, Any]:
+        """Controller with delayed targets: the actuator ``ideal_pd`` with the position, velocity and effort targets of
+        ``delay`` steps ago.
+        """
+        return {"delayed_pd": value}
+
+
 @dataclass(kw_only=True, slots=True)
 class NameCaseCfg:
     """Letter case of the names of a merged robot, prefixes and added names included."""
@@ -206,6 +227,29 @@ class DcMotor:
 
     saturation_effort: float
     """Stall effort [N m or N]. It depends on the motor, so it has no default."""
+
+
+@dataclass(kw_only=True, slots=True)
+class DelayedPd:
+    """Controller with delayed targets: the actuator ``ideal_pd`` with the position, velocity and effort targets of
+    ``delay`` steps ago. Its measurements are not delayed.
+
+    A target that is set before step n acts from step n + ``delay`` on. Until then, and after a reset, the targets are
+    those of the start: the initial positions, with velocity and effort 0. Steps are MuJoCo's, ``physics_dt / substeps``
+    long. ``Robot.set_delay`` changes the delay at run time, per environment.
+
+    Step n uses the targets of step n - delay, with the delay at step n. If the delay grows by k, the last k applied
+    targets act again, in their order. If it shrinks by k, the next k targets never act.
+
+    A position target is clamped to the target range twice: when it is set, and again when it acts, to the range at that
+    time (``Robot.set_qpos_limits``).
+    """
+
+    delay: int = 0
+    """Delay of the targets when the robot is added [MuJoCo steps]."""
+
+    max_delay: int = 0
+    """Largest delay that ``Robot.set_delay`` accepts [MuJoCo steps]. A value below ``delay`` counts as ``delay``."""
 
 
 @dataclass(kw_only=True, slots=True)
@@ -425,3 +469,24 @@ class ArticulationCfg:
 
     semantic_class: str | None = None
     """Semantic class in the table of mask ids; ``None`` for ``articulation``."""
+
+
+@dataclass(kw_only=True, slots=True)
+class InspectCfg:
+    """Robot files and position to inspect."""
+
+    urdf: UrdfCfg | Mapping[str, Any] | str | os.PathLike[str] = field(default_factory=UrdfCfg)
+    """The URDF files; empty if ``mjcf`` is set."""
+
+    mjcf: MjcfFile | Mapping[str, Any] | str | os.PathLike[str] | None = None
+    """The MJCF file of the robot (``RobotCfg.mjcf``), instead of URDF files. For a body with several joints, the report
+    has a massless link between consecutive joints.
+    """
+
+    floating_base: bool = False
+    """True for a floating base: its six degrees of freedom are part of the dynamics. Default false: a fixed base."""
+
+    qpos: Mapping[str, float] = field(default_factory=dict)
+    """Positions [rad or m] by joint name. Joints without a position are at 0, or at ``ref`` of an MJCF file. Joints
+    that follow others (mimic joints, or curves of an MJCF file) have the implied position.
+    """

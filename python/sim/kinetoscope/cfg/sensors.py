@@ -66,22 +66,31 @@ class RayPattern:
 
     @staticmethod
     def grid(value: GridPattern | Mapping[str, Any]) -> dict[str, Any]:
+        """Parallel rays over a rectangle in the xy plane around the sensor, as in height scanners."""
         return {"grid": value}
 
     @staticmethod
     def lidar(value: LidarPattern | Mapping[str, Any]) -> dict[str, Any]:
+        """A spinning lidar with channels at equal steps of elevation."""
         return {"lidar": value}
 
     @staticmethod
     def bpearl(value: BpearlPattern | Mapping[str, Any]) -> dict[str, Any]:
+        """The hemispherical lidar RS-Bpearl, with its dome along z (on robots it is mounted upside down or tilted:
+        rotate the sensor).
+        """
         return {"bpearl": value}
 
     @staticmethod
     def pinhole(value: PinholePattern | Mapping[str, Any]) -> dict[str, Any]:
+        """One ray through the center of every pixel of a pinhole camera that looks along x with z up, row by row from
+        the top left.
+        """
         return {"pinhole": value}
 
     @staticmethod
     def custom(value: CustomPattern | Mapping[str, Any]) -> dict[str, Any]:
+        """User-defined rays, in the frame of the sensor; both lists have the same length."""
         return {"custom": value}
 
 
@@ -179,7 +188,6 @@ class RayCasterCfg:
     """Configuration of a ray caster.
 
     The height scanner of Isaac's tutorials, 20 m above its robot so that it sees the ground from above:
-
 
     For rays within about 7° of an axis of a mesh, a lookup structure is built once for each mesh and axis, when such
     rays are first cast. It allocates memory, mostly at the reset right after the sensor is built, but also in a later

@@ -1,0 +1,131 @@
+//! Control of a simulation as a viewer: pause, single steps, speed.
+
+use crate::errors::{Class, Failure};
+use crate::shared::Shared;
+use crate::simulation::Simulation;
+use kinetoscope::sim::EnvId;
+use kinetoscope::viewer::{self, Command, SnapshotRequest, Speed, ViewerExt as _};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+/// A viewer that is a program, made by ``SimulationManager.viewer``: it pauses, steps and paces the simulation, while another
+/// thread steps it by ``update``, which handles commands after each step. Its pause and speed end with ``close``.
+#[pyclass(frozen, module = "kinetoscope")]
+#[derive(Debug)]
+pub(crate) struct Viewer {
+    shared: Arc<Shared>,
+    /// `None` after `close`.
+    inner: Mutex<Option<viewer::Viewer>>,
+}
+
+#[pymethods]
+impl Simulation {
+    /// Adds a viewer that pauses, steps and paces the simulation from the program.
+    fn viewer(&self, py: Python<'_>) -> PyResult<Viewer> {
+        let request =
+            SnapshotRequest { contacts: None, markers: false, joints: false, cameras: false, ..Default::default() };
+        let inner = self.shared.write(py, |sim| Ok(sim.viewer(request)))?;
+        Ok(Viewer { shared: Arc::clone(&self.shared), inner: Mutex::new(Some(inner)) })
+    }
+}
+
+#[pymethods]
+impl Viewer {
+    /// Pauses the simulation: ``update`` waits until any viewer resumes it, or this one is closed.
+    fn pause(&self, py: Python<'_>) -> PyResult<()> {
+        self.send(py, Command::Pause)
+    }
+
+    /// Resumes the simulation, whichever viewer paused it.
+    fn resume(&self, py: Python<'_>) -> PyResult<()> {
+        self.send(py, Command::Resume)
+    }
+
+    /// Runs this many steps inside the calls of ``update``, then pauses.
+    #[pyo3(signature = (steps=1))]
+    fn step(&self, py: Python<'_>, steps: u32) -> PyResult<()> {
+        self.send(py, Command::Step(steps))
+    }
+
+    /// Sets the speed: simulated seconds per second, from 0.001 to 1000, or None for no limit.
+    fn set_speed(&self, py: Python<'_>, speed: Option<f64>) -> PyResult<()> {
+        let [least, most] = Speed::FACTOR_RANGE;
+        if let Some(speed) = speed.filter(|speed| !(least..=most).contains(speed)) {
+            return Err(Failure::argument("set_speed", format!("{speed} is not from {least} to {most}")).into());
+        }
+        self.send(py, Command::SetSpeed(speed.map_or(Speed::Unlimited, Speed::Factor)))
+    }
+
+    /// Resets an environment, or all, after the next step.
+    #[pyo3(signature = (env=None))]
+    fn reset(&self, py: Python<'_>, env: Option<usize>) -> PyResult<()> {
+        if let Some(env) = env.filter(|env| *env >= self.shared.num_envs()) {
+            let message = format!("environment {env} does not exist; there are {}", self.shared.num_envs());
+            return Err(Failure::new(Class::OutOfRange, message).into());
+        }
+        self.send(py, Command::Reset(env.map(EnvId)))
+    }
+
+    /// State of the simulation when it last published one, at most 30 times per second: a dict of ``steps`` since the
+    /// simulation was created, ``paused``, ``speed`` (None for no limit), ``measured_speed`` (simulated seconds per second, or
+    /// None) and ``refusal``, the reason of the last refused command, or None.
+    #[getter]
+    fn state<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let newest = match self.lock().as_ref() {
+            Some(viewer) => viewer.newest(),
+            None => return Err(closed().into()),
+        };
+        let newest = newest.ok_or_else(|| Failure::new(Class::Viewer, "the simulation has published no state yet"))?;
+        let dict = PyDict::new(py);
+        dict.set_item("steps", newest.run.steps)?;
+        dict.set_item("paused", newest.run.paused)?;
+        let speed = if let Speed::Factor(factor) = newest.run.speed { Some(factor) } else { None };
+        dict.set_item("speed", speed)?;
+        dict.set_item("measured_speed", newest.run.measured_speed)?;
+        dict.set_item("refusal", &newest.run.last_refusal)?;
+        Ok(dict)
+    }
+
+    /// Ends the viewer, its pause and its speed. A second call does nothing.
+    fn close(&self, py: Python<'_>) {
+        let viewer = self.lock().take();
+        py.detach(|| drop(viewer));
+    }
+
+    fn __enter__(slf: Bound<'_, Self>) -> Bound<'_, Self> {
+        slf
+    }
+
+    #[pyo3(signature = (*_exception))]
+    fn __exit__(&self, py: Python<'_>, _exception: &Bound<'_, pyo3::types::PyTuple>) {
+        self.close(py);
+    }
+
+    fn __repr__(&self) -> &'static str {
+        if self.lock().is_some() { "<Viewer>" } else { "<Viewer, closed>" }
+    }
+}
+
+impl Viewer {
+    fn send(&self, py: Python<'_>, command: Command) -> PyResult<()> {
+        let sent = py.detach(|| match self.lock().as_ref() {
+            Some(viewer) => Ok(viewer.send(command)),
+            None => Err(closed()),
+        })?;
+        if sent {
+            return Ok(());
+        }
+        let message = "the simulation has ended, or 4096 commands wait for a call of update";
+        Err(Failure::new(Class::Viewer, message).into())
+    }
+
+    /// The viewer. The lock is never held during a call into the simulation or into Python.
+    fn lock(&self) -> MutexGuard<'_, Option<viewer::Viewer>> {
+        self.inner.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+fn closed() -> Failure {
+    Failure::new(Class::Viewer, "the viewer is closed")
+}
