@@ -27,6 +27,7 @@ mod settings;
 mod startup;
 mod step;
 mod tasks;
+mod thread_time;
 mod trace;
 mod view;
 
