@@ -6,6 +6,8 @@
 //! cargo run --release --example add_sensors_on_robot -- --headless --robot quadruped/quadruped.xml --spawn-height 0
 //! ```
 
+#![allow(clippy::print_stdout, clippy::print_stderr, reason = "a program prints")]
+
 mod launcher;
 
 use clap::Parser;

@@ -14,6 +14,8 @@
 //! The exit code is 0 if at least 15 of 16 robots stand at the end and their bodies have never touched the floor. It is
 //! 1 for fewer robots, as with the second command, whose wheels stand still, and 2 for an error.
 
+#![allow(clippy::print_stdout, clippy::print_stderr, reason = "a program prints")]
+
 mod launcher;
 
 use clap::Parser;

@@ -5,6 +5,8 @@
 //! cargo run --release --example create_robot -- --headless --num-envs 4 --steps 4000
 //! ```
 
+#![allow(clippy::print_stdout, clippy::print_stderr, reason = "a program prints")]
+
 mod launcher;
 
 use clap::Parser;

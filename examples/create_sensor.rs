@@ -6,6 +6,8 @@
 //! cargo run --release --example create_sensor -- --headless --steps 1 --renderer rt --out images
 //! ```
 
+#![allow(clippy::print_stdout, clippy::print_stderr, reason = "a program prints")]
+
 mod launcher;
 
 use clap::{Parser, ValueEnum};

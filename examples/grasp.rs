@@ -18,6 +18,8 @@
 //! lift, the hands follow the same paths as in the first command, as the report shows. After the lift, the position of
 //! the cube decides whether a path exists.
 
+#![allow(clippy::print_stdout, clippy::print_stderr, reason = "a program prints")]
+
 mod launcher;
 
 use clap::Parser;

@@ -1,5 +1,7 @@
 //! A report on a robot before MuJoCo loads it: tree, joints, masses, dynamics, and every diagnostic of its files.
 
+#![allow(clippy::print_stdout, clippy::print_stderr, reason = "a program prints")]
+
 mod launcher;
 
 use clap::Parser;

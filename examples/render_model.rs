@@ -4,6 +4,8 @@
 //! cargo run --release --example render_model -- /usr/share/mujoco/model/humanoid/humanoid.xml --out images
 //! ```
 
+#![allow(clippy::print_stdout, clippy::print_stderr, reason = "a program prints")]
+
 mod launcher;
 
 use clap::{Parser, ValueEnum};

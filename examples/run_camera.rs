@@ -5,6 +5,8 @@
 //! cargo run --release --example run_camera -- --headless --num-envs 2 --steps 200 --save --draw --out images
 //! ```
 
+#![allow(clippy::print_stdout, clippy::print_stderr, reason = "a program prints")]
+
 mod launcher;
 
 use clap::Parser;

@@ -4,6 +4,8 @@
 //! cargo run --release --example run_frame_transformer -- --headless --steps 500 --out images
 //! ```
 
+#![allow(clippy::print_stdout, clippy::print_stderr, reason = "a program prints")]
+
 mod launcher;
 
 use clap::Parser;

@@ -4,6 +4,8 @@
 //! cargo run --release --example run_ray_caster -- --headless --num-envs 4 --steps 1000 --out images
 //! ```
 
+#![allow(clippy::print_stdout, clippy::print_stderr, reason = "a program prints")]
+
 mod launcher;
 
 use clap::Parser;

@@ -4,6 +4,8 @@
 //! cargo run --release --example run_ray_caster_camera -- --headless --num-envs 2 --steps 200 --save --out images
 //! ```
 
+#![allow(clippy::print_stdout, clippy::print_stderr, reason = "a program prints")]
+
 mod launcher;
 
 use clap::Parser;

@@ -5,6 +5,8 @@
 //! cargo run --release --example stereo -- --headless --steps 100 --out images
 //! ```
 
+#![allow(clippy::print_stdout, clippy::print_stderr, reason = "a program prints")]
+
 mod launcher;
 
 use clap::Parser;

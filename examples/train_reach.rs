@@ -15,6 +15,8 @@
 //! The exit code is 0 if the arm has learned the task. It is 1 if it has not, as with the second command, which
 //! shuffles the returns between policies, and 2 for an error.
 
+#![allow(clippy::print_stdout, clippy::print_stderr, reason = "a program prints")]
+
 mod launcher;
 
 use clap::Parser;

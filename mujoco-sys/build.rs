@@ -5,37 +5,21 @@
 //!
 //! On docs.rs, where MuJoCo is missing, the committed declarations of 2.2.2 are used and nothing is linked.
 
+mod installation;
+
+use installation::{Download, Installation, WHEELS, cargo_errors};
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
-use std::process::Command;
 use std::{env, fs};
-
-/// The three lines of the error without MuJoCo.
-const NOT_FOUND: &str = "MuJoCo was not found: install it (Debian 12: apt-get install libmujoco-dev, version 2.2.2),\n\
-                         or set MUJOCO_DIR to a folder with include/mujoco and libmujoco.so* of MuJoCo 2.2.2 or 4.x,\n\
-                         or enable the feature `download` of kinetoscope, which gets MuJoCo 4.0.1 from PyPI by pip";
 
 /// Name of a library of `MUJOCO_DIR` for the linker.
 const LINKED: &str = "mujoco-of-mujoco-dir";
 
-/// Version of MuJoCo that the feature `download` gets.
-const DOWNLOADED: &str = "4.0.1";
-
-/// Architecture, platform tag and SHA-256 of the wheels of [`DOWNLOADED`]. Headers and library are the same in the wheels
-/// of all Python versions, of which these are for 3.11.
-const WHEELS: [(&str, &str, &str); 2] = [
-    ("x86_64", "manylinux_2_28_x86_64", "be28c0c7587347ef996b4de0487264e9da296282082b092bae211a9163e9aed6"),
-    ("aarch64", "manylinux_2_28_aarch64", "52d934614a56f7d75dcfc2bd8bb72f058b465ecc19a0583a56df242f9505bdb6"),
-];
-
-const SUPPORTED: &str = "supported versions: MuJoCo 2.2.2 (Debian 12: apt-get install libmujoco-dev) and MuJoCo 4.x \
-                         (set MUJOCO_DIR to a folder with include/mujoco and libmujoco.so*, for example the unpacked \
-                         PyPI wheel mujoco-core)";
-
 fn main() {
     println!("cargo::rerun-if-env-changed=MUJOCO_DIR");
     println!("cargo::rerun-if-changed=build.rs");
+    println!("cargo::rerun-if-changed=installation.rs");
     println!("cargo::rerun-if-env-changed=DOCS_RS");
     println!("cargo::rustc-check-cfg=cfg(mj4)");
     let out = PathBuf::from(env::var_os("OUT_DIR").expect("cargo sets OUT_DIR"));
@@ -48,8 +32,11 @@ fn main() {
         }
         return;
     }
-    let installation = Installation::find(&out).unwrap_or_else(|message| {
-        message.lines().for_each(|line| println!("cargo::error={line}"));
+    let given = env::var_os("MUJOCO_DIR").map(PathBuf::from);
+    let wanted = env::var_os("CARGO_FEATURE_DOWNLOAD").map(|_| download(&out));
+    let found = Installation::find(given, wanted, &["/usr/include", "/usr/local/include"].map(Path::new));
+    let installation = found.unwrap_or_else(|message| {
+        print!("{}", cargo_errors(&message));
         std::process::exit(1);
     });
     println!("cargo::rerun-if-changed={}", installation.header("mujoco.h").display());
@@ -57,180 +44,56 @@ fn main() {
     if installation.major() >= 4 {
         println!("cargo::rustc-cfg=mj4");
     }
-    installation.link();
+    link(&installation);
 
     write_bindings(&installation, &out.join("bindings.rs"));
     write_fields(&installation, &out.join("fields.rs"));
 }
 
-struct Installation {
-    include: PathBuf,
-    /// Library file in `MUJOCO_DIR`. `None` without `MUJOCO_DIR`: the linker's default search then finds the library.
-    library: Option<PathBuf>,
-    version_header: u32,
-}
-
-impl Installation {
-    fn find(out: &Path) -> Result<Self, String> {
-        let given = env::var_os("MUJOCO_DIR").map(PathBuf::from);
-        let wants_download = given.is_none() && env::var_os("CARGO_FEATURE_DOWNLOAD").is_some();
-        let folder = if wants_download { Some(download(out)?) } else { given };
-        let (include, library) = match folder {
-            Some(dir) => {
-                let dir =
-                    fs::canonicalize(&dir).map_err(|e| format!("MUJOCO_DIR={}: {e}; {SUPPORTED}", dir.display()))?;
-                let library = find_library(&dir).ok_or_else(|| {
-                    format!("MUJOCO_DIR={}: no libmujoco.so* in it, nor in its lib/; {SUPPORTED}", dir.display())
-                })?;
-                (dir.join("include"), Some(library))
-            }
-            None => {
-                let include = ["/usr/include", "/usr/local/include"]
-                    .iter()
-                    .map(PathBuf::from)
-                    .find(|dir| dir.join("mujoco/mujoco.h").exists())
-                    .ok_or(NOT_FOUND)?;
-                (include, None)
-            }
-        };
-        let header = include.join("mujoco/mujoco.h");
-        let text = fs::read_to_string(&header).map_err(|e| format!("{}: {e}; {SUPPORTED}", header.display()))?;
-        let version_header = text
-            .lines()
-            .find_map(|line| line.trim().strip_prefix("#define mjVERSION_HEADER")?.trim().parse().ok())
-            .ok_or_else(|| format!("{}: no mjVERSION_HEADER in it; {SUPPORTED}", header.display()))?;
-        let found = Self { include, library, version_header };
-        if version_header != 222 && found.major() != 4 {
-            return Err(format!(
-                "{} belongs to MuJoCo {version_header}, which is not supported; {SUPPORTED}",
-                header.display()
-            ));
-        }
-        Ok(found)
-    }
-
-    fn header(&self, name: &str) -> PathBuf {
-        self.include.join("mujoco").join(name)
-    }
-
-    /// Major version. `mjVERSION_HEADER` is 222 for 2.2.2; since 3.5 it is major * 10^6 + minor * 10^3 + patch.
-    fn major(&self) -> u32 {
-        if self.version_header < 1000 { self.version_header / 100 } else { self.version_header / 1_000_000 }
-    }
-
-    fn link(&self) {
-        let Some(library) = &self.library else {
-            println!("cargo::rustc-link-lib=dylib=mujoco");
-            return;
-        };
-        let name = library.file_name().and_then(|n| n.to_str()).expect("find_library returns a UTF-8 file name");
-        // Cargo adds only link-search folders below OUT_DIR to the library path of `cargo run` and `cargo test`. A
-        // symlink there lets tests and examples find a library outside the system's search path.
-        let out = PathBuf::from(env::var_os("OUT_DIR").expect("cargo sets OUT_DIR"));
-        // A second link for the linker: not every linker finds the versioned name. Its name is unlike that of the library,
-        // so that no library of a system folder is linked instead. Programs load the library by its SONAME.
-        for link in [name, &format!("lib{LINKED}.so")] {
-            let link = out.join(link);
-            let _ = fs::remove_file(&link);
-            #[cfg(unix)]
-            std::os::unix::fs::symlink(library, &link).expect("OUT_DIR is writable");
-        }
-        println!("cargo::rustc-link-search=native={}", out.display());
-        let folder = library.parent().expect("find_library returns a file in a folder");
-        println!("cargo::metadata=library_dir={}", folder.display());
-        println!("cargo::rustc-link-lib=dylib={LINKED}");
-    }
-}
-
-/// Gets the wheel with MuJoCo by pip, which compares its hash, and unpacks it in a folder of the user.
+/// The download for the target, into a folder for data of the user: `~/.local/share/kinetoscope`, or below `out` without a
+/// home folder.
 ///
-/// Not below `out`: `cargo install` deletes that folder, and the installed program loads the library from where it is.
-fn download(out: &Path) -> Result<PathBuf, String> {
+/// Not below `out` otherwise: `cargo install` deletes that folder, and the installed program loads the library from where
+/// it is.
+fn download(out: &Path) -> Download<'static> {
     for variable in ["XDG_DATA_HOME", "HOME"] {
         println!("cargo::rerun-if-env-changed={variable}");
     }
-    let target = |variable: &str| env::var(variable).unwrap_or_default();
-    let (arch, os) = (target("CARGO_CFG_TARGET_ARCH"), target("CARGO_CFG_TARGET_OS"));
-    let wheel = WHEELS.iter().find(|(name, ..)| *name == arch).filter(|_| os == "linux");
-    let Some((_, platform, hash)) = wheel else {
-        return Err(format!("the feature `download` has no MuJoCo for {arch} {os}; set MUJOCO_DIR instead"));
-    };
-    let data = data_folder(out);
-    let complete = data.join(format!("mujoco-{DOWNLOADED}-{arch}"));
-    let unpacked = complete.join("mujoco");
-    let is_complete = || unpacked.join(format!("libmujoco.so.{DOWNLOADED}")).is_file();
-    if is_complete() {
-        return Ok(unpacked);
-    }
-    let (requirements, wheels) = (out.join("wheel.txt"), out.join("wheels"));
-    // In the folder of the result, so that it can be renamed; other builds may unpack at the same time.
-    let scratch = data.join(format!("mujoco-{DOWNLOADED}-{arch}.{}.tmp", std::process::id()));
-    for folder in [&wheels, &scratch] {
-        remove(folder)?;
-    }
-    let failed = |path: &Path| {
-        let path = path.display().to_string();
-        move |error: std::io::Error| format!("{path}: {error}")
-    };
-    fs::create_dir_all(&scratch).map_err(failed(&scratch))?;
-    let requirement = format!("mujoco-core=={DOWNLOADED} --hash=sha256:{hash}\n");
-    fs::write(&requirements, requirement).map_err(failed(&requirements))?;
-    let mut pip = Command::new("python3");
-    pip.args(["-m", "pip", "download", "--no-input", "--disable-pip-version-check", "--quiet", "--no-deps"])
-        .args(["--only-binary=:all:", "--python-version", "3.11", "--platform", platform, "--require-hashes"])
-        .arg("--requirement")
-        .arg(&requirements)
-        .arg("--dest")
-        .arg(&wheels);
-    run(&mut pip)?;
-    let wheel = fs::read_dir(&wheels).map_err(failed(&wheels))?.flatten().next();
-    let wheel = wheel.ok_or("pip downloaded no wheel of mujoco-core")?.path();
-    run(Command::new("python3").args(["-m", "zipfile", "-e"]).arg(&wheel).arg(&scratch))?;
-    // Renamed at the end: a folder of that name with the library is complete.
-    if fs::rename(&scratch, &complete).is_err() && !is_complete() {
-        remove(&complete)?;
-        fs::rename(&scratch, &complete).map_err(failed(&complete))?;
-    }
-    remove(&scratch)?;
-    remove(&wheels)?;
-    Ok(unpacked)
-}
-
-/// Folder for data of the user, `~/.local/share/kinetoscope`; below `out` without a home folder.
-fn data_folder(out: &Path) -> PathBuf {
     let absolute = |variable: &str| env::var_os(variable).map(PathBuf::from).filter(|path| path.is_absolute());
     let home = absolute("XDG_DATA_HOME").or_else(|| absolute("HOME").map(|home| home.join(".local/share")));
-    home.map_or_else(|| out.to_path_buf(), |folder| folder.join("kinetoscope"))
-}
-
-fn remove(folder: &Path) -> Result<(), String> {
-    match fs::remove_dir_all(folder) {
-        Err(error) if error.kind() != std::io::ErrorKind::NotFound => Err(format!("{}: {error}", folder.display())),
-        _ => Ok(()),
+    let target = |variable: &str| env::var(variable).unwrap_or_default();
+    Download {
+        arch: target("CARGO_CFG_TARGET_ARCH"),
+        os: target("CARGO_CFG_TARGET_OS"),
+        wheels: &WHEELS,
+        data: home.map_or_else(|| out.to_path_buf(), |folder| folder.join("kinetoscope")),
+        scratch: out.to_path_buf(),
+        pip_options: Vec::new(),
     }
 }
 
-/// Runs a command; its messages are part of the error.
-fn run(command: &mut Command) -> Result<(), String> {
-    let name =
-        format!("{} -m {}", command.get_program().display(), command.get_args().nth(1).unwrap_or_default().display());
-    let output = command.output().map_err(|e| format!("{name}: {e} (the feature `download` needs Python with pip)"))?;
-    if output.status.success() {
-        return Ok(());
+/// Links the library.
+fn link(installation: &Installation) {
+    let Some(library) = &installation.library else {
+        println!("cargo::rustc-link-lib=dylib=mujoco");
+        return;
+    };
+    let name = library.file_name().and_then(|n| n.to_str()).expect("find_library returns a UTF-8 file name");
+    // Cargo adds only link-search folders below OUT_DIR to the library path of `cargo run` and `cargo test`. A
+    // symlink there lets tests and examples find a library outside the system's search path.
+    let out = PathBuf::from(env::var_os("OUT_DIR").expect("cargo sets OUT_DIR"));
+    // A second link for the linker: not every linker finds the versioned name. Its name is unlike that of the library,
+    // so that no library of a system folder is linked instead. Programs load the library by its SONAME.
+    for link in [name, &format!("lib{LINKED}.so")] {
+        let link = out.join(link);
+        let _ = fs::remove_file(&link);
+        #[cfg(unix)]
+        std::os::unix::fs::symlink(library, &link).expect("OUT_DIR is writable");
     }
-    Err(format!("{name} failed: {}", String::from_utf8_lossy(&output.stderr).trim()))
-}
-
-fn find_library(dir: &Path) -> Option<PathBuf> {
-    let mut found: Vec<PathBuf> = [dir.to_path_buf(), dir.join("lib")]
-        .iter()
-        .filter_map(|d| fs::read_dir(d).ok())
-        .flatten()
-        .filter_map(|entry| entry.ok().map(|e| e.path()))
-        .filter(|p| p.file_name().and_then(|n| n.to_str()).is_some_and(|n| n.starts_with("libmujoco.so")))
-        .collect();
-    found.sort();
-    found.into_iter().next()
+    println!("cargo::rustc-link-search=native={}", out.display());
+    let folder = library.parent().expect("find_library returns a file in a folder");
+    println!("cargo::metadata=library_dir={}", folder.display());
+    println!("cargo::rustc-link-lib=dylib={LINKED}");
 }
 
 #[derive(Debug)]

@@ -3,6 +3,8 @@
 //! `cargo xtask bench` runs them on both supported MuJoCo versions. A table goes to standard error, the rows as JSON to
 //! a file.
 
+#![allow(clippy::print_stdout, clippy::print_stderr, reason = "a program prints")]
+
 mod baseline;
 mod camera;
 mod contacts;
@@ -25,6 +27,7 @@ mod settings;
 mod startup;
 mod step;
 mod tasks;
+mod thread_time;
 mod trace;
 mod view;
 

@@ -3,7 +3,7 @@
 use std::fs;
 
 /// Unit of times below /proc \[s\]: Linux shows them in hundredths of a second on every architecture.
-const TICK: f64 = 0.01;
+pub(crate) const TICK: f64 = 0.01;
 
 /// Processor time \[s\], of all cores together, used since boot by processes other than this one and the processes
 /// `ours`; `None` without /proc, or if one of `ours` has ended.
@@ -23,8 +23,8 @@ fn busy_ticks(stat: &str) -> Option<u64> {
     Some(ticks.iter().take(8).enumerate().filter(|(i, _)| *i != 3 && *i != 4).map(|(_, t)| t).sum())
 }
 
-/// `utime + stime` of a line such as `12 (a name) S 1 ...`; this includes threads that have ended.
-fn process_ticks(stat: &str) -> Option<u64> {
+/// `utime + stime` of a line such as `12 (a name) S 1 ...`; that of a process includes threads that have ended.
+pub(crate) fn process_ticks(stat: &str) -> Option<u64> {
     let mut fields = stat.get(stat.rfind(')')? + 1..)?.split_whitespace().skip(11);
     Some(fields.next()?.parse::<u64>().ok()? + fields.next()?.parse::<u64>().ok()?)
 }

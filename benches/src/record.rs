@@ -4,10 +4,15 @@
 //! depth uncompressed, and the states of every image. A block ends when all data are passed to the file. There are two
 //! speeds: real time, where the recorder uses the idle part of the machine, and maximum speed, where simulation and
 //! recorder compete.
+//!
+//! Another row is the number of frames that one core encodes for an MP4 file: frames per second of processor time of the
+//! recorder's thread.
 
 use crate::interleave::{Contender, MeasurementCfg, in_both_orders, measure};
 use crate::row::Row;
 use crate::settings::{BenchResult, Settings};
+use crate::thread_time::thread_seconds;
+use kinetoscope::ndarray::Array2;
 use kinetoscope::prelude::*;
 use kinetoscope::record::{RecorderCfg, RecorderId};
 use kinetoscope::sensors::camera::Camera;
@@ -22,6 +27,14 @@ const IMAGE_EVERY: u32 = 8;
 const TARGET_RATIO: f64 = 0.95;
 /// A recording restarts after this many steps, at some hundred megabytes.
 const RESTART: u32 = 4000;
+/// Width and height of videos.
+const VIDEO_SIZE: [usize; 2] = [640, 480];
+/// Frames before the measurement of videos: the first one is larger.
+const WARM_UP_FRAMES: u32 = 10;
+/// Frames of a video per second of the nominal time of a measurement: the rate that one core is meant to exceed.
+const VIDEO_RATE: f64 = 200.0;
+/// Name of the thread of a recorder.
+const RECORDER_THREAD: &str = "recording";
 
 struct Arms {
     sim: SimulationManager,
@@ -94,6 +107,47 @@ impl Contender for Arms {
     }
 }
 
+/// Frames of a camera on a moving arm that one core encodes per second as a video; `None` if the system does not say how
+/// much time a thread used.
+fn video_frames_per_second(frames: u32) -> BenchResult<Option<f64>> {
+    let mut sim = SimulationManager::new(SimulationManagerCfg { num_envs: 1, ..Default::default() })?;
+    let urdf = UrdfCfg::single(assets::path("sr5/SR5.urdf")?);
+    let arm = sim.add_robot(RobotCfg { uid: "arm".into(), urdf, ..Default::default() })?;
+    let [width, height] = VIDEO_SIZE;
+    let camera = CameraCfg {
+        width,
+        height,
+        channels: Channels { color: true, ..Channels::NONE },
+        extrinsics: Extrinsics {
+            parent: Some("ee_link".into()),
+            placement: Placement::LookAt { eye: [0.0; 3], target: [0.0, 0.0, 1.0], up: [0.0, 1.0, 0.0] },
+            ..Extrinsics::default()
+        },
+        update_period: sim.cfg().physics_dt,
+        ..CameraCfg::default()
+    };
+    sim.add_sensor("camera", camera)?;
+    let folder = tempfile::tempdir()?;
+    let recorder = sim.record(RecorderCfg::new(folder.path().join("run.mp4")))?;
+    let mut before = 0.0;
+    for frame in 0..WARM_UP_FRAMES + frames {
+        if frame == WARM_UP_FRAMES {
+            sim.observers_mut().get_mut(recorder)?.wait_until_written();
+            let Some(seconds) = thread_seconds(RECORDER_THREAD) else { return Ok(None) };
+            before = seconds;
+        }
+        // A turn of half a radian in each direction, in 2 s.
+        let angle = 0.5 * (std::f64::consts::TAU * f64::from(frame) / 60.0).sin();
+        let targets = Array2::from_elem((1, sim.robot(arm).dof()), angle);
+        sim.robot_mut(arm).set_qpos_target(&targets, None, None)?;
+        sim.update(1);
+    }
+    sim.observers_mut().get_mut(recorder)?.wait_until_written();
+    let after = thread_seconds(RECORDER_THREAD);
+    sim.finish_recording(recorder)?;
+    Ok(after.map(|after| f64::from(frames) / (after - before)))
+}
+
 /// Simulated seconds per second in real time: each step begins on schedule, or as soon as possible.
 fn real_time_factor(recorded: bool, seconds: f64) -> BenchResult<f64> {
     let mut arms = Arms::new(recorded)?;
@@ -126,8 +180,13 @@ pub(crate) fn run(settings: &Settings) -> BenchResult<Vec<Row>> {
     let case = |speed: &str| format!("{ENVS} envs, camera {SIDE} x {SIDE} RGB-D at 30 Hz, {speed}");
     let real = Row::new("record", case("in real time"), "x real time", threads, with);
     let free = Row::new("record", case("without real-time limit"), "env-steps/s", threads, times.rate(0, ENVS));
-    Ok(vec![
+    let mut rows = vec![
         real.against("without recording", without, with / without).with_target_ratio(TARGET_RATIO),
         free.against("without recording", times.rate(1, ENVS), times.ratio(0, 1)).with_target_ratio(TARGET_RATIO),
-    ])
+    ];
+    if let Some(rate) = video_frames_per_second((VIDEO_RATE * settings.seconds) as u32)? {
+        let [width, height] = VIDEO_SIZE;
+        rows.push(Row::new("record", format!("MP4 of a moving camera, {width} x {height}"), "frames/s", 1, rate));
+    }
+    Ok(rows)
 }

@@ -1,6 +1,8 @@
 //! `kinetoscope`: command line tool that checks, converts, renders, simulates, benchmarks and replays robots and
 //! scenes.
 
+#![allow(clippy::print_stdout, clippy::print_stderr, reason = "a program prints")]
+
 mod bench;
 mod channel_image;
 mod check;

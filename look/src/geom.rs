@@ -4,7 +4,7 @@ use crate::{GeomType, VisualModel};
 use kinetoscope_scene::mesh::TriMesh;
 use kinetoscope_scene::shape::{Box as Cuboid, Capsule, Cylinder, Ellipsoid, HeightField, Mesh, Plane, Sphere};
 use kinetoscope_scene::shape::{RenderMesh, Shape};
-use kinetoscope_scene::vector::{cross, norm, sub};
+use kinetoscope_scene::vector::{cross, sub, try_normalize};
 use std::collections::HashMap;
 use std::sync::Arc;
 
@@ -96,9 +96,7 @@ const CREASE: f32 = 0.8;
 /// Unit normal of a triangle; up for one without area.
 fn face_normal(positions: &[[f32; 3]], corners: [i32; 3]) -> [f32; 3] {
     let [a, b, c] = corners.map(|i| positions.get(i as usize).copied().unwrap_or_default());
-    let n = cross(sub(b, a), sub(c, a));
-    let length = norm(n);
-    if length > 0.0 && length.is_finite() { n.map(|x| x / length) } else { [0.0, 0.0, 1.0] }
+    try_normalize(cross(sub(b, a), sub(c, a)), 0.0).unwrap_or([0.0, 0.0, 1.0])
 }
 
 /// Triangles with a vertex for each combination of position and texture coordinates. Normals are recomputed, smooth up

@@ -6,6 +6,7 @@ use kinetoscope_render::frame::{Channels, Frame};
 use kinetoscope_render::{Intrinsics, ParallelRenderer, RasterCfg};
 use kinetoscope_scene::PoseF32;
 use kinetoscope_scene::camera_fit::CameraFit;
+use kinetoscope_scene::vector::{add, sub};
 use kinetoscope_sensors::camera::look_at_pose;
 use kinetoscope_sim::{OffscreenScene, SimulationManager};
 use serde::{Deserialize, Serialize};
@@ -76,8 +77,8 @@ impl OverviewRenderer {
         // An empty scene uses the first view of an empty model.
         let place = framing.fit(&[still.placed()]).map(|place| (place.eye, place.target));
         let (first_eye, first_target) = place.unwrap_or((first.eye, first.target));
-        let (offset, target) = ([0, 1, 2].map(|k| first_eye[k] - first_target[k]), cfg.target.unwrap_or(first_target));
-        let eye = cfg.eye.unwrap_or([0, 1, 2].map(|k| target[k] + offset[k]));
+        let (offset, target) = (sub(first_eye, first_target), cfg.target.unwrap_or(first_target));
+        let eye = cfg.eye.unwrap_or(add(target, offset));
         let pose = look_at_pose(eye, target, [0.0, 0.0, 1.0])
             .map_err(|error| wrong(format!("from {eye:?} to {target:?}: {error}")))?;
         let pixels =

@@ -445,6 +445,7 @@ impl Recorder {
             Err(TryRecvError::Disconnected) => None,
             Err(TryRecvError::Empty) if self.is_live => {
                 self.dropped_rows += 1;
+                self.report_drop();
                 None
             }
             Err(TryRecvError::Empty) => {
@@ -469,6 +470,15 @@ impl Recorder {
                 seconds,
                 "the simulation waits for the recorder"
             );
+        }
+    }
+
+    /// Emits an event about the first dropped row, the second, the fourth and so on.
+    fn report_drop(&self) {
+        let dropped_rows = self.dropped_rows;
+        if dropped_rows.is_power_of_two() {
+            let path = self.cfg.path.display();
+            tracing::warn!(target: "kinetoscope_record", %path, dropped_rows, "a live stream drops rows: its writer is too slow");
         }
     }
 

@@ -1,7 +1,7 @@
 //! Camera placement in which the drawn scene fills the image.
 
 use crate::shape::Shape;
-use crate::vector::{cross, norm, sub};
+use crate::vector::{cross, norm, sub, try_normalize};
 use crate::{Instance, PoseF32, RenderScene};
 
 /// Instances of a scene at their poses, shifted by an offset.
@@ -148,8 +148,7 @@ fn diagonal([low, high]: [[f64; 3]; 2]) -> f64 {
 }
 
 fn unit(a: [f64; 3]) -> Option<[f64; 3]> {
-    let length = norm(a);
-    (length > 1e-9 && length.is_finite()).then(|| a.map(|x| x / length))
+    try_normalize(a, 1e-9)
 }
 
 #[cfg(test)]

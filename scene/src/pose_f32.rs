@@ -1,7 +1,7 @@
 //! Poses of the renderer: a rotation matrix and a translation in single precision.
 
 use crate::Pose;
-use crate::vector::{cross, dot};
+use crate::vector::{add, cross, dot};
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 
 /// A rigid transform in `f32`, row-major: `x -> rotation * x + translation`.
@@ -53,7 +53,7 @@ impl PoseF32 {
 
     /// Rotates a direction from the source frame into the target frame: `rotation * v`.
     pub fn rotate(&self, v: [f32; 3]) -> [f32; 3] {
-        self.rotation.map(|r| r[0] * v[0] + r[1] * v[1] + r[2] * v[2])
+        self.rotation.map(|r| dot(r, v))
     }
 
     /// Rotates a direction from the target frame into the source frame.
@@ -64,8 +64,7 @@ impl PoseF32 {
 
     /// Maps a point \[m\] from the source frame into the target frame: `rotation * p + translation`.
     pub fn apply(&self, p: [f32; 3]) -> [f32; 3] {
-        let (q, t) = (self.rotate(p), self.translation);
-        [q[0] + t[0], q[1] + t[1], q[2] + t[2]]
+        add(self.rotate(p), self.translation)
     }
 
     /// Maps a point \[m\] from the target frame into the source frame.

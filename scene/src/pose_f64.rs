@@ -1,5 +1,6 @@
 //! Poses of ray casters: a rotation matrix and a translation in double precision.
 
+use crate::vector::{add, dot};
 use crate::{Pose, PoseF32};
 
 /// A rigid transform in `f64`, row-major: `x -> rotation * x + translation`.
@@ -47,7 +48,7 @@ impl PoseF64 {
     /// Rotates a direction from the source frame into the target frame: `rotation * v`.
     #[inline]
     pub fn rotate(&self, v: [f64; 3]) -> [f64; 3] {
-        self.rotation.map(|r| r[0] * v[0] + r[1] * v[1] + r[2] * v[2])
+        self.rotation.map(|r| dot(r, v))
     }
 
     /// Rotates a direction from the target frame into the source frame.
@@ -60,8 +61,7 @@ impl PoseF64 {
     /// Maps a point \[m\] from the source frame into the target frame: `rotation * p + translation`.
     #[inline]
     pub fn apply(&self, p: [f64; 3]) -> [f64; 3] {
-        let (q, t) = (self.rotate(p), self.translation);
-        [q[0] + t[0], q[1] + t[1], q[2] + t[2]]
+        add(self.rotate(p), self.translation)
     }
 
     /// Maps a point \[m\] from the target frame into the source frame.

@@ -1,4 +1,4 @@
-//! Three-dimensional vectors as arrays, which meshes and renderers store: the only place of these functions.
+//! Functions of three-dimensional vectors as arrays, the form in which meshes and renderers store them.
 //!
 //! The sums have the order of nalgebra's, so that both have the same bits. The functions are in the inner loops of the
 //! renderers.
@@ -64,6 +64,13 @@ pub fn normalize(a: V3) -> Option<V3> {
     Some(scale(a, 1.0 / dot(a, a).sqrt()))
 }
 
+/// Vector divided by its length; `None` if the length is not above `min_norm` or not finite.
+#[inline(always)]
+pub fn try_normalize<T: RealField + Copy>(a: [T; 3], min_norm: T) -> Option<[T; 3]> {
+    let length = norm(a);
+    (length > min_norm && length.is_finite()).then(|| a.map(|x| x / length))
+}
+
 /// Converts a vector to double precision.
 #[inline(always)]
 pub fn to_f64(a: [f32; 3]) -> V3 {
@@ -83,12 +90,18 @@ mod tests {
             assert!(dot(a, b) == u.dot(&v) && norm(a) == u.norm());
             assert!(cross(a, b) == <[T; 3]>::from(u.cross(&v)));
             assert!(add(a, b) == <[T; 3]>::from(u + v) && sub(a, b) == <[T; 3]>::from(u - v));
+            let shorter = u.norm() / nalgebra::convert(2.0);
+            assert!(try_normalize(a, shorter) == u.try_normalize(shorter).map(<[T; 3]>::from));
+            assert!(try_normalize(a, u.norm()).is_none() && u.try_normalize(u.norm()).is_none());
         }
         for k in 0..100 {
             let x = |i: i32| f64::from(k * 7 + i).sin() * 10f64.powi(k % 9 - 4);
             let (a, b) = ([x(0), x(1), x(2)], [x(3), x(4), x(5)]);
             check(a, b);
             check(a.map(|x| x as f32), b.map(|x| x as f32));
+        }
+        for wrong in [f64::NAN, f64::INFINITY] {
+            assert_eq!(try_normalize([1.0, wrong, 0.0], 0.0), None);
         }
         // Control: another order of the sum has other bits.
         let a = [1e16, -1e16, 1.0];

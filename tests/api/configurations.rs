@@ -2,8 +2,10 @@
 
 use kinetoscope::prelude::*;
 use kinetoscope::record::{Format, OverviewCfg, RecorderCfg, Topic};
-use kinetoscope::sim::Shard;
+use kinetoscope::scene::mesh::{DaeUpAxis, MeshOptions};
 use kinetoscope::sim::inspect::InspectCfg;
+use kinetoscope::sim::{PerJoint, Shard};
+use kinetoscope::tasks::terms::{JointPositionsCfg, TerrainLevelsCfg, UniformVelocityCfg};
 use kinetoscope::tasks::{AutoresetMode, EnvCfg};
 use kinetoscope::viewer::{
     EnvSelection, ImageWindowCfg, OrbitCamera, Overlays, ScreenshotCfg, ServeCfg, Speed, WindowCfg,
@@ -88,4 +90,23 @@ fn tasks_and_files() {
         &InspectCfg { floating_base: true, qpos, ..InspectCfg::default() },
     );
     check("rank = 1\nworld = 4", &Shard { rank: 1, world: 4 });
+    check("dae_up_axis = \"apply\"", &MeshOptions { dae_up_axis: DaeUpAxis::Apply });
+}
+
+#[test]
+fn terms_of_tasks() {
+    let scale = PerJoint::from([("wrist.*", 0.25)]);
+    check("scale = { \"wrist.*\" = 0.25 }", &JointPositionsCfg { scale, ..JointPositionsCfg::default() });
+    let bounds = [-1.0, f64::INFINITY];
+    check("scale = 2\nbounds = [-1, inf]", &JointPositionsCfg { scale: PerJoint::All(2.0), bounds });
+    let levels = TerrainLevelsCfg { max_initial_level: Some(2), command: Some("walk".into()), episode_seconds: 8.0 };
+    check("max_initial_level = 2\ncommand = \"walk\"\nepisode_seconds = 8", &levels);
+    let velocity = UniformVelocityCfg { heading: Some([-3.0, 3.0]), ..UniformVelocityCfg::default() };
+    check("heading = [-3, 3]", &velocity);
+    let once = UniformVelocityCfg { resampling_time: None, ..UniformVelocityCfg::default() };
+    check("resampling_time = false", &once);
+    for wrong in ["true", "5", "[1, 2, 3]"] {
+        let error = toml::from_str::<UniformVelocityCfg>(&format!("resampling_time = {wrong}")).unwrap_err();
+        assert!(error.message().contains("expected a range [low, high], or false"), "{wrong}: {error}");
+    }
 }

@@ -1,5 +1,6 @@
 //! Tests of the public API: robots, objects, drives, tasks and sensors, each compared with closed forms, with MuJoCo or
 //! with another method.
+#![allow(clippy::print_stdout, clippy::print_stderr, reason = "output of tests")]
 #![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
 
 mod articulations;

@@ -1,5 +1,6 @@
 //! User input, valid and invalid: it works, or it is refused with a helpful message. A refused call changes nothing,
 //! and no input ends the process.
+#![allow(clippy::print_stdout, clippy::print_stderr, reason = "output of tests")]
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 mod accepted;

@@ -14,6 +14,7 @@
 //! | `examples`, `same_images` | the table of example runs, and the comparison of their images |
 //! | `physics_page`, `svg` | the page of the laws of physics, and its plots |
 //! | `mutations` | the lists of code mutations |
+#![allow(clippy::print_stdout, clippy::print_stderr, reason = "a program prints")]
 #![forbid(unsafe_code)]
 
 mod bench;

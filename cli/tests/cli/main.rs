@@ -1,4 +1,5 @@
 //! Integration tests of the command `kinetoscope` and its views.
+#![allow(clippy::print_stderr, reason = "modules of the command print")]
 #![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
 
 mod browser;

@@ -1,6 +1,7 @@
 //! Polygons of shapes, as MuJoCo's OpenGL renderer draws them.
 
 use kinetoscope_scene::shape::{Plane, RenderMesh, Shape};
+use kinetoscope_scene::vector::norm;
 use kinetoscope_scene::{PlaneLines, Tessellation};
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
@@ -121,7 +122,7 @@ impl Facets {
         self.add(size, |s, t| {
             let unit = on_ball(s, PI * t - FRAC_PI_2);
             let gradient = [0, 1, 2].map(|k| unit[k] / radii[k]);
-            let length = gradient.iter().map(|x| x * x).sum::<f64>().sqrt();
+            let length = norm(gradient);
             ([0, 1, 2].map(|k| radii[k] * unit[k]), gradient.map(|x| x / length))
         });
     }

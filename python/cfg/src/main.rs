@@ -2,6 +2,7 @@
 //!
 //! Names, types and documentation come from the Rust sources, default values from the running program. With `--check`,
 //! the files are compared instead of written. Run it with `cargo xtask python-cfg`.
+#![allow(clippy::print_stdout, clippy::print_stderr, reason = "a program prints")]
 #![forbid(unsafe_code)]
 
 mod python;

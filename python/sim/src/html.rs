@@ -2,6 +2,7 @@
 
 use kinetoscope::robot::description::RobotDescription;
 use kinetoscope::sim::Robot;
+use quick_xml::escape::escape;
 use std::fmt::Write as _;
 
 /// Table of the joints and tree of the links. All names are escaped.
@@ -51,8 +52,4 @@ fn tree(description: &RobotDescription, html: &mut String) {
         children.reverse();
         open.extend(children.into_iter().map(|child| (child, depth + 1)));
     }
-}
-
-pub(crate) fn escape(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }

@@ -556,7 +556,7 @@ impl Robot {
     fn _repr_html_(&self, py: Python<'_>) -> PyResult<String> {
         let html = self.shared.describe(py, "Robot", |sim| Ok(crate::html::robot(&sim.robot(self.id))))?;
         // Of a destroyed simulation, and of one in use, this is a plain text.
-        Ok(if html.starts_with("<Robot") { crate::html::escape(&html) } else { html })
+        Ok(if html.starts_with("<Robot") { quick_xml::escape::escape(&html).into_owned() } else { html })
     }
 }
 

@@ -182,3 +182,70 @@ impl Encoder for Mp4 {
         self.file.finish(out, self.stream.parameter_sets())
     }
 }
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+mod tests {
+    use super::*;
+    use mp4parse::{
+        CodecType, MediaTimeScale, SampleEntry, TrackScaledTime, TrackTimeScale, TrackType, VideoCodecSpecific,
+    };
+    use std::fs::File;
+    use std::io::BufWriter;
+
+    /// Reference: the demuxer of Firefox, which refuses boxes of wrong sizes. Frames are found by its offsets and sizes.
+    #[test]
+    fn demuxed_by_mp4parse() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("run.mp4");
+        let size = [64, 48];
+        let mut out: Output = BufWriter::new(Box::new(File::create(&path).unwrap()));
+        let mut encoder = begin(size).unwrap();
+        // 200 frames at 30 Hz, then 50 at 60 Hz.
+        let times: Vec<f64> = (0..=250).map(|k| f64::from(2 * k.min(200) + (k - k.min(200))) / 60.0).collect();
+        for (k, shown) in times.windows(2).enumerate() {
+            let rgba: Vec<u8> = (0..4 * 64 * 48).map(|at| (at / 4 % 64 * 3 + k) as u8).collect();
+            encoder.frame(&mut out, &rgba, [shown[0], shown[1]]).unwrap();
+        }
+        encoder.finish(&mut out).unwrap();
+        out.flush().unwrap();
+
+        let file = std::fs::read(&path).unwrap();
+        let movie = mp4parse::read_mp4(&mut file.as_slice()).unwrap();
+        assert_eq!(movie.timescale, Some(MediaTimeScale(90_000)));
+        let [track] = movie.tracks.as_slice() else { panic!("{} tracks", movie.tracks.len()) };
+        assert!(track.track_type == TrackType::Video && track.track_id == Some(1), "{track:?}");
+        assert_eq!(track.timescale, Some(TrackTimeScale(90_000, 0)));
+        let seconds = TrackScaledTime(90_000 * 450 / 60, 0);
+        assert_eq!((track.duration, track.empty_duration, track.media_time), (Some(seconds), None, None));
+        let header = track.tkhd.as_ref().unwrap();
+        assert_eq!((header.disabled, header.duration), (false, 675_000));
+        assert_eq!([header.width, header.height], [64 << 16, 48 << 16]);
+        let [SampleEntry::Video(entry)] = track.stsd.as_ref().unwrap().descriptions.as_slice() else {
+            panic!("{:?}", track.stsd)
+        };
+        assert_eq!((entry.codec_type, [entry.width, entry.height]), (CodecType::H264, [64, 48]));
+        let VideoCodecSpecific::AVCConfig(sets) = &entry.codec_specific else { panic!("{entry:?}") };
+        // Version 1, constrained baseline (the second flag), four bytes of length before each unit.
+        assert_eq!((&sets[..3], sets[4] & 3), (&[1, 66, 0x40][..], 3));
+
+        let shown = &track.stts.as_ref().unwrap().samples;
+        let shown: Vec<[u32; 2]> = shown.iter().map(|some| [some.sample_count, some.sample_delta]).collect();
+        assert_eq!(shown, [[200, 3_000], [50, 1_500]]);
+        assert_eq!(track.stss.as_ref().unwrap().samples.as_slice(), [1, 121, 241]);
+        let chunks = track.stsc.as_ref().unwrap().samples.as_slice();
+        assert_eq!(chunks.iter().map(|c| [c.first_chunk, c.samples_per_chunk]).collect::<Vec<_>>(), [[1, 1]]);
+        let (sizes, offsets) = (&track.stsz.as_ref().unwrap().sample_sizes, &track.stco.as_ref().unwrap().offsets);
+        assert_eq!((sizes.len(), offsets.len()), (250, 250));
+        for (k, (offset, size)) in offsets.iter().zip(sizes.iter()).enumerate() {
+            let mut units = &file[*offset as usize..][..*size as usize];
+            while !units.is_empty() {
+                let (length, rest) = units.split_first_chunk().unwrap();
+                let (unit, rest) = rest.split_at(u32::from_be_bytes(*length) as usize);
+                // Slices of pictures: 5 of IDR pictures, 1 of others.
+                assert_eq!(unit[0] & 31, if k % 120 == 0 { 5 } else { 1 }, "frame {k}");
+                units = rest;
+            }
+        }
+    }
+}

@@ -3,11 +3,14 @@
 
 use super::*;
 use crate::Record;
+use crate::packet::Packet;
+use crate::stream::StreamSchema;
 use crate::tests::{EnvId, ObjectShape, RayCasterCfg, World, messages, scratch};
+use crate::writer::{FormatWriter, WriteResult};
 use kinetoscope_sensors::ContactSensorCfg;
 use kinetoscope_sensors::ray::pattern::Grid;
-use kinetoscope_testkit::wait;
 use kinetoscope_testkit::worlds::{cfg, fixed, object, sim};
+use kinetoscope_testkit::{events, wait};
 use serde_json::{Value, json};
 use std::collections::{BTreeMap, BTreeSet};
 use std::net::TcpStream;
@@ -263,6 +266,48 @@ fn no_reader() {
     assert_eq!(server.clients(), 0);
     assert!(server.close(&mut world.sim).is_err() && server.dropped_rows(&world.sim).is_err());
     assert!(TcpStream::connect(server.address()).is_err(), "the server does not listen");
+}
+
+/// A writer that is as slow as a test wants: it writes once the sender is gone.
+struct BlockedWriter(Receiver<()>);
+
+impl FormatWriter for BlockedWriter {
+    fn write(&mut self, _streams: &[StreamSchema], _packet: &Packet) -> WriteResult {
+        let _ = self.0.recv();
+        Ok(())
+    }
+
+    fn finish(&mut self, _streams: &[StreamSchema]) -> WriteResult<u64> {
+        Ok(0)
+    }
+
+    fn partial_path(&self) -> Option<PathBuf> {
+        None
+    }
+}
+
+/// A stream whose writer is too slow drops rows and waits for nothing; the first drop, the second, the fourth and so on are
+/// events.
+#[test]
+fn dropped_rows() {
+    events::start();
+    let mut sim = sim(cfg(1, 1));
+    sim.add_rigid_object(object("cube", ObjectShape::cube(0.2), [0.0, 0.0, 0.1])).unwrap();
+    let (end, blocked) = channel();
+    let cfg = RecorderCfg { path: "dropped_rows".into(), packets: 2, ..RecorderCfg::default() };
+    let recorder = Recorder::start_live(&mut sim, cfg, |_, _, _| Ok(Box::new(BlockedWriter(blocked)))).unwrap();
+    let observer = sim.observers_mut().add(recorder);
+    // The state at the start and one row fill the packets.
+    for (steps, dropped) in [(1, 0), (1, 1), (18, 19)] {
+        sim.update(steps);
+        let recorder = sim.observers().get(observer).unwrap();
+        assert_eq!((recorder.dropped_rows(), recorder.summary().waits), (dropped, 0));
+    }
+    let drops = events::collected(|event| event.fields.get("path").is_some_and(|path| path == "dropped_rows"));
+    let counts: Vec<&str> = drops.iter().map(|event| event.fields["dropped_rows"].as_str()).collect();
+    assert_eq!(counts, ["1", "2", "4", "8", "16"]);
+    assert!(drops.iter().all(|event| (event.target, event.level.as_str()) == ("kinetoscope_record", "WARN")));
+    drop(end);
 }
 
 /// Regression: a stream that an error had stopped kept its clients, which saw a robot that never moved again, and no

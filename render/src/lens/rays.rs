@@ -4,7 +4,7 @@ use super::Optics;
 use crate::optics_error::OpticsError;
 use crate::raster::tile::{BLOCK, SAMPLES};
 use crate::simd::{F, LANES, Simd, V3, load};
-use kinetoscope_scene::vector::{dot, norm};
+use kinetoscope_scene::vector::{add, dot, norm, sub, try_normalize};
 use std::fmt;
 use std::sync::OnceLock;
 
@@ -234,13 +234,13 @@ impl LensRays {
             let pixels = (0..BLOCK * BLOCK).map(move |k| [x0 + k % BLOCK, y0 + k / BLOCK]);
             pixels.filter_map(move |at| unit(self.direction(plane, at).map(f64::from)))
         });
-        let sum = rays.clone().fold([0.0; 3], |sum, ray| [0, 1, 2].map(|k| sum[k] + ray[k]));
+        let sum = rays.clone().fold([0.0; 3], add);
         let Some(first) = rays.clone().next() else { return Cone { axis: [0.0; 3], cosine: 2.0, sine: 0.0 } };
         let axis = unit(sum).unwrap_or(first);
         // By the chord, which keeps the digits of small angles.
         let apart = |ray: [f64; 3]| {
-            let chord = [0, 1, 2].map(|k| ray[k] - axis[k]);
-            2.0 * (0.5 * dot(chord, chord).sqrt()).min(1.0).asin()
+            let chord = norm(sub(ray, axis));
+            2.0 * (0.5 * chord).min(1.0).asin()
         };
         let angle = (rays.map(apart).fold(0.0f64, f64::max) + CONE_MARGIN).min(std::f64::consts::PI);
         Cone { axis, cosine: angle.cos(), sine: angle.sin().max(0.0) }
@@ -264,8 +264,7 @@ impl LensRays {
                     }
                     let there = self.direction(0, beside).map(f64::from);
                     if there != [0.0; 3] {
-                        let apart = [0, 1, 2].map(|k| there[k] - here[k]);
-                        sum[axis] += dot(apart, apart).sqrt();
+                        sum[axis] += norm(sub(there, here));
                         count[axis] += 1.0;
                     }
                 }
@@ -305,8 +304,7 @@ impl fmt::Debug for LensRays {
 }
 
 fn unit(a: [f64; 3]) -> Option<[f64; 3]> {
-    let length = norm(a);
-    (length > 0.0).then(|| a.map(|x| x / length))
+    try_normalize(a, 0.0)
 }
 
 #[cfg(test)]

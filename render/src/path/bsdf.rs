@@ -7,7 +7,7 @@
 use super::brightness;
 use kinetoscope_scene::Material;
 use kinetoscope_scene::sampling::{cos_sin_turns, sample_cosine_hemisphere};
-use kinetoscope_scene::vector::{V3, dot, scale};
+use kinetoscope_scene::vector::{V3, add, dot, scale};
 use std::f64::consts::PI;
 
 /// BSDF of a surface point.
@@ -144,7 +144,7 @@ impl Bsdf {
         if self.is_matt() {
             return BsdfValue { diffuse, specular: [0.0; 3] };
         }
-        let half = [0, 1, 2].map(|k| o[k] + i[k]);
+        let half = add(o, i);
         let length = dot(half, half).sqrt();
         let (tilt, angle) = (half[2] / length, dot(half, o) / length);
         let root = |cos: f64| (self.alpha2 + (1.0 - self.alpha2) * cos * cos).sqrt();
@@ -207,7 +207,7 @@ impl Bsdf {
         // The sum of both strategies' pdfs.
         let mut pdf = (1.0 - share) * i[2] / PI;
         if share > 0.0 {
-            let half = [0, 1, 2].map(|k| o[k] + i[k]);
+            let half = add(o, i);
             let tilt = half[2] / dot(half, half).sqrt();
             pdf += share * self.masking(o[2]) * self.ndf(tilt) / (4.0 * o[2]);
         }

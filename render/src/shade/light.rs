@@ -9,7 +9,7 @@ use super::texture::{self, MipRule};
 use super::tone::{self, BlendSpace};
 use crate::simd::{F, M, Simd, V3, abs, max, min, select, splat, sqrt_or_zero};
 use kinetoscope_scene::shape::Shape;
-use kinetoscope_scene::vector::norm;
+use kinetoscope_scene::vector::try_normalize;
 use kinetoscope_scene::{Light, LightKind, LightingSpace, Material, OpenGlRules, RenderScene, Texture};
 use std::sync::Arc;
 
@@ -102,8 +102,7 @@ pub(crate) struct ViewRays<S: Simd> {
 }
 
 pub(crate) fn unit(v: [f32; 3]) -> [f32; 3] {
-    let length = norm(v);
-    if length > 0.0 && length.is_finite() { v.map(|x| x / length) } else { [0., 0., -1.] }
+    try_normalize(v, 0.0).unwrap_or([0., 0., -1.])
 }
 
 /// Cosine of an angle in degrees, by its series: `cos()` differs from machine to machine.

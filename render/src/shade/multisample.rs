@@ -3,6 +3,7 @@
 use super::group::{Colors, SamplePositions, ShadingContext, resolve};
 use crate::raster::tile::{BLOCK, NO_ID, SAMPLES, Tile};
 use crate::simd::{LANES, Simd, load, load_u, min, splat, splat_u, store};
+use kinetoscope_scene::vector::dot;
 
 /// Largest number of samples that are shaded together.
 const CAPACITY: usize = 1024;
@@ -43,8 +44,7 @@ fn differ(context: &ShadingContext<'_>, a: u32, b: u32, qa: f32, qb: f32, last: 
     // Neighboring triangles of a smooth surface look the same: same normal, same distance.
     let corner = |id: u32| mesh.normals()[mesh.triangles()[(id - first[*last]) as usize][0] as usize];
     let (na, nb) = (corner(a), corner(b));
-    let cosine = na[0] * nb[0] + na[1] * nb[1] + na[2] * nb[2];
-    cosine < 0.97 || (qa - qb).abs() > 0.02 * qa
+    dot(na, nb) < 0.97 || (qa - qb).abs() > 0.02 * qa
 }
 
 impl EdgeSamples {

@@ -444,6 +444,7 @@ mod tests {
     use super::*;
     use crate::simd::{all_levels, at_level};
     use kinetoscope_scene::shape::{Box, Capsule, Cylinder, Ellipsoid, Plane, Sphere};
+    use kinetoscope_scene::vector::{dot, norm, sub};
 
     const QUALITY: Tessellation = Tessellation { slices: 28, stacks: 16, quads: 4 };
 
@@ -533,16 +534,17 @@ mod tests {
                         (0..LANES).map(|k| Corners::of(&found, k)).collect()
                     });
                     for ([point, normal], found) in sixteen.iter().zip(&found) {
-                        let dot = |a: [f32; 3], b: [f32; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
                         let mean =
                             [0, 1, 2].map(|k| (0..3).map(|c| found.shares[c] * found.positions[c][k]).sum::<f32>());
-                        let off = [0, 1, 2].map(|k| mean[k] - point[k]);
-                        assert!(dot(off, off).sqrt() < *height, "{} {point:?} {found:?}", shape.name());
+                        assert!(norm(sub(mean, *point)) < *height, "{} {point:?} {found:?}", shape.name());
                         assert!((found.shares.iter().sum::<f32>() - 1.0).abs() < 1e-5);
                         assert!(found.shares.iter().all(|&x| x >= -1e-5));
                         for c in 0..3 {
-                            let to = [0, 1, 2].map(|k| found.positions[c][k] - point[k]);
-                            assert!(dot(to, to).sqrt() < *edge, "{} {point:?} {found:?}", shape.name());
+                            assert!(
+                                norm(sub(found.positions[c], *point)) < *edge,
+                                "{} {point:?} {found:?}",
+                                shape.name()
+                            );
                             assert!((dot(found.normals[c], found.normals[c]) - 1.0).abs() < 1e-5);
                             assert!(dot(found.normals[c], *normal) > 0.9, "{} {found:?}", shape.name());
                         }

@@ -7,6 +7,7 @@ use crate::shade::tone::ToneCurve;
 use crate::visibility::View;
 use kinetoscope_scene::shape::Shape;
 use kinetoscope_scene::shape::{Box, Plane, Sphere};
+use kinetoscope_scene::vector::{add, dot, sub};
 use kinetoscope_scene::{Instance, Light, LightKind, LightingSpace, Material, PoseF32, RenderScene, Sky};
 use kinetoscope_testkit::scenes::{TestRng, instances, matte, random_scene, unlit};
 use kinetoscope_testkit::srgb::{linear, srgb};
@@ -58,7 +59,6 @@ fn expected(still: &TestFrame, image: &Image, k: usize, [z, sign]: [f32; 2]) -> 
     let to = [0, 1, 2].map(|i| f64::from(point.translation[i] - eye[i]));
     let mirrored = [CENTER[0], CENTER[1], z + sign * (CENTER[2] - z)];
     let from = [0, 1, 2].map(|i| f64::from(mirrored[i] - eye[i]));
-    let dot = |a: [f64; 3], b: [f64; 3]| (0..3).map(|i| a[i] * b[i]).sum::<f64>();
     let along = dot(from, to) / dot(to, to).sqrt();
     let off = (dot(from, from) - along * along).max(0.0).sqrt() - f64::from(RADIUS);
     // Two pixels are at most 0.05 m wide here.
@@ -254,9 +254,9 @@ fn reflected_eye() {
     let (mut compared, mut wrong, mut things) = (0, 0, 0);
     for k in seen.inner().filter(|&k| seen.is_inside_instance(k) && seen.mask()[k] == 99).step_by(3) {
         let (below, at) = ([eye[0], eye[1], -eye[2]], seen.position()[k]);
-        let to = [0, 1, 2].map(|i| at[i] - below[i]);
+        let to = sub(at, below);
         // The camera is in the mirror's plane; one pixel of its image is as wide as the mirror's pixel.
-        let view = View { near: 1e-4, ..look_at_view([1, 1], 0.01, at, [0, 1, 2].map(|i| at[i] + to[i])) };
+        let view = View { near: 1e-4, ..look_at_view([1, 1], 0.01, at, add(at, to)) };
         let there = TestFrame { cfg, ..TestFrame::new((without.clone(), poses.clone()), view) }.draw();
         let far = (0..3).any(|c| there.color()[0][c].abs_diff(seen.color()[k][c]) > 3);
         (compared, wrong) = (compared + 1, wrong + usize::from(far));

@@ -6,7 +6,7 @@
 use super::motion::Motion;
 use kinetoscope_scene::PoseF64;
 use kinetoscope_scene::Ray;
-use kinetoscope_scene::vector::{V3, scale};
+use kinetoscope_scene::vector::{V3, add, scale, sub};
 
 /// Enlargement of boxes: more than the rounding of the test.
 const BOUNDS_SCALE: f64 = 1.0 + 1e-6;
@@ -49,18 +49,18 @@ impl InstanceBvh {
     /// Adds a static instance. `thing` is its index, `pose` is world from instance, `[lo, hi]` its bounding box in its
     /// own frame.
     pub(super) fn add(&mut self, thing: u32, pose: &PoseF64, [lo, hi]: [V3; 2]) {
-        let at = pose.apply([0, 1, 2].map(|k| 0.5 * (lo[k] + hi[k])));
-        let half = [0, 1, 2].map(|k| 0.5 * (hi[k] - lo[k]));
+        let at = pose.apply(scale(add(lo, hi), 0.5));
+        let half = scale(sub(hi, lo), 0.5);
         let reach = pose.rotation.map(|r| BOUNDS_SCALE * (0..3).map(|k| r[k].abs() * half[k]).sum::<f64>());
         let pad = [0, 1, 2].map(|k| reach[k] + 1e-9 * (at[k].abs() + reach[k]));
-        let bounds = [[0, 1, 2].map(|k| at[k] - pad[k]), [0, 1, 2].map(|k| at[k] + pad[k])];
+        let bounds = [sub(at, pad), add(at, pad)];
         self.boxes.push((bounds, scale(at, 2.0), thing));
     }
 
     /// Adds a moving instance; `bounds` is its bounding box in its own frame.
     pub(super) fn add_moving(&mut self, thing: u32, motion: &Motion, bounds: [V3; 2]) {
         let [lo, hi] = motion.bounds(bounds, BOUNDS_SCALE);
-        self.boxes.push(([lo, hi], [0, 1, 2].map(|k| lo[k] + hi[k]), thing));
+        self.boxes.push(([lo, hi], add(lo, hi), thing));
     }
 
     /// Bounding box of all instances in the world \[m\], after building; `None` without instances.

@@ -493,7 +493,7 @@ impl LocalCameraRays {
         for (((ray, length), c), none) in rays.iter_mut().zip(&mut length).zip(&directions).zip(&mut none) {
             *none = *c == [0.0; 3];
             let c = if *none { [0.0, 0.0, 1.0] } else { *c };
-            let d = self.rotation.map(|r| r[0] * c[0] + r[1] * c[1] + r[2] * c[2]);
+            let d = self.rotation.map(|r| dot(r, c));
             *length = dot(d, d).sqrt();
             // Rays start at the near plane.
             *ray = Ray { origin: add_scaled(self.origin, self.near, d), direction: scale(d, 1.0 / *length) };

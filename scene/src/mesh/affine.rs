@@ -1,6 +1,7 @@
 //! Affine transforms of points and normals, including scale and shear.
 
 use super::builder::unit;
+use crate::vector::dot;
 
 /// The upper three rows of a transform.
 pub(super) type Affine = [[f64; 4]; 3];
@@ -56,7 +57,7 @@ impl PreparedAffine {
     /// Transformed unit normal; `None` for a zero normal or one that the transform flattens.
     pub(super) fn normal(&self, n: [f64; 3]) -> Option<[f32; 3]> {
         let sign = if self.mirrored { -1.0 } else { 1.0 };
-        let n = self.cofactors.map(|row| sign * (row[0] * n[0] + row[1] * n[1] + row[2] * n[2]));
+        let n = self.cofactors.map(|row| sign * dot(row, n));
         // Scaled first: the cofactors of a file in millimeters are of the order 1e-6.
         let largest = n.iter().fold(0.0f64, |m, x| m.max(x.abs()));
         if !(largest > 0.0 && largest.is_finite()) {

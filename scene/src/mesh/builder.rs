@@ -5,7 +5,7 @@ use std::hash::{BuildHasherDefault, Hasher};
 
 use super::error::ReadContext;
 use super::{MeshError, MeshMaterial, Submesh, TriMesh};
-use crate::vector::{cross, norm, sub};
+use crate::vector::{cross, sub, try_normalize};
 
 /// Largest number of triangles that a file may expand to. It is far above any robot part, and keeps a few malicious
 /// lines of instances from filling the memory.
@@ -115,16 +115,12 @@ impl Builder {
 
 /// Vector scaled to unit length; `None` for a vector that is not finite or not longer than 1e-20.
 pub(super) fn unit(v: [f32; 3]) -> Option<[f32; 3]> {
-    let v = v.map(f64::from);
-    let length = norm(v);
-    (length.is_finite() && length > 1e-20).then(|| v.map(|x| (x / length) as f32 + 0.0))
+    try_normalize(v.map(f64::from), 1e-20).map(|v| v.map(|x| x as f32 + 0.0))
 }
 
 fn face_normal(corners: &[Corner; 3]) -> Option<[f32; 3]> {
     let [a, b, c] = corners.map(|c| c.position.map(f64::from));
-    let n = cross(sub(b, a), sub(c, a));
-    let length = norm(n);
-    (length > 0.0 && length.is_finite()).then(|| n.map(|x| (x / length) as f32 + 0.0))
+    try_normalize(cross(sub(b, a), sub(c, a)), 0.0).map(|n| n.map(|x| x as f32 + 0.0))
 }
 
 struct Welder {

@@ -7,7 +7,7 @@
 
 use super::cell::{Cell, winding_number};
 use super::{HullCfg, HullError, TriMesh, convex_hull};
-use crate::vector::{cross, dot, sub};
+use crate::vector::{cross, dot, norm, sub, try_normalize};
 use serde::{Deserialize, Serialize};
 
 /// Version of the algorithm. It changes whenever the same input may give other pieces; part of the key of
@@ -329,16 +329,13 @@ fn clip_triangle(triangle: &Triangle, heights: [f64; 3]) -> Vec<V3> {
 /// Unit normal of a triangle; `None` for a degenerate triangle.
 pub(super) fn unit_normal(&[a, b, c]: &Triangle) -> Option<V3> {
     let (u, v) = (sub(b, a), sub(c, a));
-    let normal = cross(u, v);
-    let length = dot(normal, normal).sqrt();
     // Twice the area against the longest sides: below this ratio, single precision does not resolve the normal.
-    (length > 1e-10 * (dot(u, u) + dot(v, v))).then(|| normal.map(|x| x / length))
+    try_normalize(cross(u, v), 1e-10 * (dot(u, u) + dot(v, v)))
 }
 
 /// Area of a triangle \[m²\].
 pub(super) fn area(&[a, b, c]: &Triangle) -> f64 {
-    let normal = cross(sub(b, a), sub(c, a));
-    dot(normal, normal).sqrt() / 2.0
+    norm(cross(sub(b, a), sub(c, a))) / 2.0
 }
 
 #[cfg(test)]

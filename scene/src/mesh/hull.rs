@@ -290,13 +290,13 @@ impl Quickhull {
         }
         let face = &self.faces[face];
         let from_face = sub(self.points[point], self.points[face.corners[0]]).map(|x| x as i128);
-        (0..3).map(|i| face.exact[i] * from_face[i]).sum::<i128>() > 0
+        dot(face.exact, from_face) > 0
     }
 
     fn add(&mut self, corners: [usize; 3], neighbors: [usize; 3]) {
         let [a, b, c] = corners.map(|i| self.points[i]);
         let [u, v] = [sub(b, a), sub(c, a)].map(|e| e.map(|x| x as i128));
-        let exact = [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]];
+        let exact = cross(u, v);
         let normal = exact.map(|x| x as f64);
         let length = norm(normal).max(1.0);
         for corner in corners {

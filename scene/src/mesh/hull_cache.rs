@@ -176,6 +176,7 @@ mod tests {
     use super::*;
     use crate::mesh::dae::tests::document;
     use crate::mesh::{obj, stl, write_binary_stl};
+    use crate::vector::sub;
 
     const TETRAHEDRON: &str = r##"<triangles count="4"><input semantic="VERTEX" source="#v" offset="0"/>
         <p>0 2 1 0 1 3 0 3 2 1 2 3</p></triangles>"##;
@@ -235,7 +236,7 @@ mod tests {
             let hull = cache.hull_of_file_with(&path, &MeshOptions { dae_up_axis }, [1.0, 1.0, 2.0], &cfg).unwrap();
             assert!((hull.signed_volume() - 2.0).abs() < 1e-6, "1 x 3 x 2 / 6, doubled along z");
             let (lo, hi) = hull.bounds().unwrap();
-            [0, 1, 2].map(|k| hi[k] - lo[k])
+            sub(hi, lo)
         };
         for _ in 0..2 {
             // `Ignore` keeps the axes of the file. `Apply` makes its y axis the z axis, which is doubled.

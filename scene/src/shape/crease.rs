@@ -1,12 +1,11 @@
 //! Normals per corner: smooth across small angles, sharp across creases.
 
 use crate::mesh::TriMesh;
-use crate::vector::{cross, dot, norm, sub};
+use crate::vector::{cross, dot, sub, try_normalize};
 use std::collections::HashMap;
 
 pub(super) fn unit(a: [f32; 3]) -> Option<[f32; 3]> {
-    let length = norm(a);
-    (length > 0.0 && length.is_finite()).then(|| a.map(|x| x / length))
+    try_normalize(a, 0.0)
 }
 
 /// For every vertex, the first vertex at the same position.

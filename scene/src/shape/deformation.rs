@@ -1,7 +1,7 @@
 //! Vertex maps of meshes with moving vertices.
 
 use super::RenderMesh;
-use crate::vector::{add, cross, norm, sub};
+use crate::vector::{add, cross, sub, try_normalize};
 
 /// Vertex maps of a deformable mesh.
 #[derive(Debug, Default)]
@@ -50,7 +50,6 @@ pub fn smooth_normals(positions: &[[f32; 3]], triangles: &[[u32; 3]], normals: &
         }
     }
     for normal in normals {
-        let length = norm(*normal);
-        *normal = if length > 0.0 && length.is_finite() { normal.map(|x| x / length) } else { [0.0; 3] };
+        *normal = try_normalize(*normal, 0.0).unwrap_or_default();
     }
 }

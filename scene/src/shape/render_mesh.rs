@@ -4,7 +4,7 @@ use super::crease::{corner_normals, face_normals, unit, weld};
 use super::deformation::Deformation;
 use super::lod::{self, LodLevel};
 use crate::mesh::{Submesh, TriMesh};
-use crate::vector::{dot, sub};
+use crate::vector::{add, dot, sub};
 use std::collections::HashMap;
 use std::ops::Range;
 use std::sync::{Arc, OnceLock};
@@ -257,7 +257,7 @@ impl RenderMesh {
         let first_lane = self.cluster_positions[0].len();
         let (mut lo, mut hi) = ([f32::MAX; 3], [f32::MIN; 3]);
         let faces = faces.filter(|&n| n != [0.0; 3]);
-        let axis = faces.clone().fold([0.0f32; 3], |axis, n| [0, 1, 2].map(|a| axis[a] + n[a]));
+        let axis = faces.clone().fold([0.0f32; 3], add);
         for k in first..end {
             let triangle = self.triangles[k];
             let p = triangle.map(|i| self.positions[i as usize]);

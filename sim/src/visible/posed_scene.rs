@@ -11,6 +11,7 @@ use kinetoscope_mujoco::{Data, Model, ObjectKind};
 use kinetoscope_render::RenderRequest;
 use kinetoscope_render::View;
 use kinetoscope_scene::camera_fit::{CameraFit, DEFAULT_FILL, PosedScene};
+use kinetoscope_scene::vector::sub;
 use kinetoscope_scene::{Light, Marker, Pose, PoseF32};
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 use std::path::Path;
@@ -84,7 +85,7 @@ impl OffscreenScene {
         let still = Self::of_data(&Arc::new(VisualScene::with_sites(&model)), &data);
         let FreeCamera { eye, target, .. } = still.free_camera;
         // The author of the file chose the viewing direction.
-        Ok(Self { view_direction: [0, 1, 2].map(|k| target[k] - eye[k]), ..still })
+        Ok(Self { view_direction: sub(target, eye), ..still })
     }
 
     /// Creates the offscreen scene of one environment in its current state. Poses are in the frame of the environment.

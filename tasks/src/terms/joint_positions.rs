@@ -7,10 +7,12 @@ use crate::space::Space;
 use kinetoscope_scene::pattern;
 use kinetoscope_sim::{PerJoint, RobotId, SimulationManager};
 use ndarray::Array2;
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 /// Numbers of [`joint_positions`].
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
 pub struct JointPositionsCfg {
     /// Change of the target for an action of 1 \[rad or m\]: one number for all joints, or numbers by patterns of joint
     /// names, with 1 for joints that no pattern matches.

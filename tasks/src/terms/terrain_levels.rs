@@ -6,9 +6,11 @@ use crate::error::{EnvError, Result};
 use crate::event::{EventMode, EventTerm};
 use kinetoscope_scene::terrain::TerrainGrid;
 use kinetoscope_sim::RobotId;
+use serde::{Deserialize, Serialize};
 
 /// Rules of [`terrain_levels`].
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
 pub struct TerrainLevelsCfg {
     /// Highest row of the grid in which environments start, uniformly distributed from row 0; `None` for all rows.
     pub max_initial_level: Option<usize>,

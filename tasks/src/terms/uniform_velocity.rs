@@ -3,12 +3,16 @@
 use super::check_range;
 use crate::command::CommandTerm;
 use crate::error::{EnvError, Result, TermKind};
+use kinetoscope_scene::file_format::or_false;
 use kinetoscope_sim::RobotId;
 use ndarray::Array2;
+use serde::de::Error as _;
+use serde::{Deserialize, Deserializer, Serialize};
 use std::f64::consts::{PI, TAU};
 
 /// Ranges of a velocity command, \[low, high\] each, uniformly distributed, with Isaac Lab's meaning.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
 pub struct UniformVelocityCfg {
     /// Velocity along the x axis of the root link \[m/s\].
     pub lin_vel_x: [f64; 2],
@@ -25,7 +29,9 @@ pub struct UniformVelocityCfg {
     pub heading_stiffness: f64,
     /// Share of commands that are 0, so that the robot has to stand still.
     pub rel_standing_envs: f64,
-    /// Range of the time after which the command is drawn again \[s\]; `None` for one command per episode.
+    /// Range of the time after which the command is drawn again \[s\]; `None` (`false` in files) for one command per
+    /// episode.
+    #[serde(serialize_with = "or_false::serialize", deserialize_with = "range_or_false")]
     pub resampling_time: Option<[f64; 2]>,
 }
 
@@ -42,6 +48,22 @@ impl Default for UniformVelocityCfg {
             rel_standing_envs: 0.0,
             resampling_time: Some([10.0, 10.0]),
         }
+    }
+}
+
+/// Reads a range, or `false` as `None`.
+fn range_or_false<'de, D: Deserializer<'de>>(deserializer: D) -> std::result::Result<Option<[f64; 2]>, D::Error> {
+    #[derive(Deserialize)]
+    #[serde(untagged)]
+    enum RangeOrFlag {
+        Range([f64; 2]),
+        Flag(bool),
+    }
+
+    match RangeOrFlag::deserialize(deserializer) {
+        Ok(RangeOrFlag::Range(range)) => Ok(Some(range)),
+        Ok(RangeOrFlag::Flag(false)) => Ok(None),
+        Ok(RangeOrFlag::Flag(true)) | Err(_) => Err(D::Error::custom("expected a range [low, high], or false")),
     }
 }
 

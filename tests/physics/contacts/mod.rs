@@ -1,6 +1,7 @@
 //! Contacts and sensors.
 
 mod ball_image;
+mod ball_in_valley;
 
 mod coulomb_directions;
 mod four_legs;

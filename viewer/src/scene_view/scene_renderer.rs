@@ -10,6 +10,7 @@ use super::trail::Trails;
 use kinetoscope_render::frame::FrameMut;
 use kinetoscope_render::{ParallelRenderer, RasterCfg, RenderRequest};
 use kinetoscope_render::{RenderError, View};
+use kinetoscope_scene::vector::sub;
 use kinetoscope_scene::{Light, Marker};
 
 /// Radius of the marker at a selected point \[pixels\].
@@ -93,8 +94,7 @@ impl SceneRenderer {
             markers.extend((depth > view.near).then_some((picked.env, ball)));
         }
         if let Some((env, [from, to])) = look.spring {
-            let way = [0, 1, 2].map(|k| to[k] - from[k]);
-            markers.extend(Marker::arrow(from, way, color::SELECTION).map(|marker| (env, marker)));
+            markers.extend(Marker::arrow(from, sub(to, from), color::SELECTION).map(|marker| (env, marker)));
         }
         self.assembly.update(snapshot, look.envs, &markers);
         // The lights of the first environment, where its bodies are.

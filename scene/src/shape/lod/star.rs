@@ -1,7 +1,7 @@
 //! The star of a vertex (the triangles around it), and the effect of a collapse onto a neighbor.
 
 use super::simplify::Surface;
-use crate::vector::{V3, cross, dot, norm, sub};
+use crate::vector::{V3, add, cross, dot, norm, sub, try_normalize};
 
 /// Largest number of triangles around a vertex that may collapse.
 pub(super) const MAX_VALENCE: usize = 32;
@@ -127,13 +127,9 @@ impl Star {
         let mut sum = [0.0; 3];
         for (i, face) in faces[..count].iter_mut().enumerate() {
             *face = cross(self.to[i], self.to[next(i)]);
-            sum = [0, 1, 2].map(|k| sum[k] + face[k]);
+            sum = add(sum, *face);
         }
-        let length = norm(sum);
-        if length == 0.0 || !length.is_finite() {
-            return false;
-        }
-        let n = sum.map(|x| x / length);
+        let Some(n) = try_normalize(sum, 0.0) else { return false };
         // Source: Duff et al., Building an Orthonormal Basis, Revisited, JCGT 2017.
         let sign = if n[2] < 0.0 { -1.0 } else { 1.0 };
         let a = -1.0 / (sign + n[2]);

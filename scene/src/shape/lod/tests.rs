@@ -3,57 +3,40 @@ use super::super::crease::weld;
 use super::super::{RenderMesh, Shape, Sphere};
 use super::{LodLevel, MIN_TRIANGLES, build_levels};
 use crate::mesh::{Submesh, TriMesh, load};
+use crate::vector::{V3, add_scaled, cross, dot, norm, sub};
 use std::collections::{BTreeMap, HashMap};
 
-type V = [f64; 3];
-
-fn sub(a: V, b: V) -> V {
-    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
-}
-
-fn dot(a: V, b: V) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
-fn along(a: V, d: V, t: f64) -> V {
-    [a[0] + t * d[0], a[1] + t * d[1], a[2] + t * d[2]]
-}
-
-fn cross(a: V, b: V) -> V {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-}
-
 /// Squared distance of a point from a triangle: from its plane if the foot is inside, else from the nearest edge.
-fn squared(p: V, t: &[V; 3]) -> f64 {
+fn squared(p: V3, t: &[V3; 3]) -> f64 {
     let n = cross(sub(t[1], t[0]), sub(t[2], t[0]));
     let (mut nearest, mut inside) = (f64::MAX, dot(n, n) > 0.0);
     for k in 0..3 {
         let (edge, to) = (sub(t[(k + 1) % 3], t[k]), sub(p, t[k]));
         inside &= dot(cross(edge, to), n) >= 0.0;
         let share = (dot(edge, to) / dot(edge, edge).max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
-        let off = along(to, edge, -share);
+        let off = add_scaled(to, -share, edge);
         nearest = nearest.min(dot(off, off));
     }
     if inside { dot(n, sub(p, t[0])).powi(2) / dot(n, n) } else { nearest }
 }
 
-fn corners(mesh: &RenderMesh) -> Vec<[V; 3]> {
+fn corners(mesh: &RenderMesh) -> Vec<[V3; 3]> {
     mesh.triangles().iter().map(|t| t.map(|i| mesh.positions()[i as usize].map(f64::from))).collect()
 }
 
 /// Triangles in blocks of neighbors, each with its bounding box.
-struct Blocks<'a>(Vec<([V; 2], &'a [[V; 3]])>);
+struct Blocks<'a>(Vec<([V3; 2], &'a [[V3; 3]])>);
 
 impl<'a> Blocks<'a> {
-    fn new(triangles: &'a [[V; 3]]) -> Self {
-        let corner = |block: &[[V; 3]], of: fn(f64, f64) -> f64| {
+    fn new(triangles: &'a [[V3; 3]]) -> Self {
+        let corner = |block: &[[V3; 3]], of: fn(f64, f64) -> f64| {
             block.iter().flatten().fold(block[0][0], |m, p| [0, 1, 2].map(|k| of(m[k], p[k])))
         };
         Self(triangles.chunks(32).map(|block| ([corner(block, f64::min), corner(block, f64::max)], block)).collect())
     }
 
     /// Squared distance of a point from the nearest triangle; boxes that are farther away are skipped.
-    fn squared(&self, p: V) -> f64 {
+    fn squared(&self, p: V3) -> f64 {
         let mut nearest = f64::MAX;
         for ([low, high], block) in &self.0 {
             let beside = [0, 1, 2].map(|k| (low[k] - p[k]).max(p[k] - high[k]).max(0.0));
@@ -66,10 +49,10 @@ impl<'a> Blocks<'a> {
 }
 
 /// Largest distance from `from` to `to`, at the corners, edge midpoints and centers of some triangles.
-fn farthest(from: &[[V; 3]], to: &[[V; 3]], triangles: usize) -> f64 {
+fn farthest(from: &[[V3; 3]], to: &[[V3; 3]], triangles: usize) -> f64 {
     let (step, to) = ((from.len() / triangles).max(1), Blocks::new(to));
     let points = from.iter().step_by(step).flat_map(|t| {
-        let mix = |w: V| std::array::from_fn(|k| w[0] * t[0][k] + w[1] * t[1][k] + w[2] * t[2][k]);
+        let mix = |w: V3| std::array::from_fn(|k| w[0] * t[0][k] + w[1] * t[1][k] + w[2] * t[2][k]);
         [[1., 0., 0.], [0.5, 0.5, 0.], [0.5, 0., 0.5], [0., 0.5, 0.5], [1. / 3.; 3]].map(mix)
     });
     points.map(|p| to.squared(p)).fold(0.0, f64::max).sqrt()
@@ -92,10 +75,10 @@ fn plate() -> TriMesh {
     let (mut positions, mut triangles) = (Vec::new(), Vec::new());
     let mut vertex = |at: [usize; 3]| {
         *index.entry(at).or_insert_with(|| {
-            let p: V = [0, 1, 2].map(|k| lines[k][at[k]]);
-            let core: V = [0, 1, 2].map(|k| p[k].clamp(RADIUS - half[k], half[k] - RADIUS));
+            let p: V3 = [0, 1, 2].map(|k| lines[k][at[k]]);
+            let core: V3 = [0, 1, 2].map(|k| p[k].clamp(RADIUS - half[k], half[k] - RADIUS));
             let out = sub(p, core);
-            positions.push(along(core, out, RADIUS / dot(out, out).sqrt()).map(|x| x as f32));
+            positions.push(add_scaled(core, RADIUS / norm(out), out).map(|x| x as f32));
             positions.len() as u32 - 1
         })
     };
@@ -167,7 +150,8 @@ fn check(name: &str, mesh: &RenderMesh, most: &[usize]) {
         assert!(coarse.len() <= most, "{name}: {} triangles instead of {most}", coarse.len());
         assert_eq!(borders(&level.mesh), open, "{name}: edges without exactly one neighbor");
         // Control: a level that is moved by twice the bound is detected.
-        let moved: Vec<[V; 3]> = coarse.iter().map(|t| t.map(|p| along(p, [1.0, 0.9, 0.8], 2.0 * error))).collect();
+        let moved: Vec<[V3; 3]> =
+            coarse.iter().map(|t| t.map(|p| add_scaled(p, 2.0 * error, [1.0, 0.9, 0.8]))).collect();
         assert!(farthest(&fine, &moved, 600) > error, "{name}: control: a displaced level must exceed the bound");
         facing(name, &level.mesh);
     }

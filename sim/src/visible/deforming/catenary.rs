@@ -5,6 +5,7 @@
 //! actuator does not hang.
 
 use kinetoscope_mujoco::{Data, Model, mjcf_keywords};
+use kinetoscope_scene::vector::{dot, norm, scale, sub};
 
 /// Number of segments of a hanging tendon; MuJoCo has as many as its round shapes have slices, 28 by default.
 pub(super) const SEGMENTS: usize = 28;
@@ -45,14 +46,13 @@ pub(super) fn hanging_length(data: &Data, tendon: usize) -> Option<f64> {
 /// Segments of a string of a length \[m\] that hangs between two points. A string that is not longer than their
 /// distance is straight.
 pub(super) fn segments([from, to]: [[f64; 3]; 2], gravity: [f64; 3], length: f64, each: &mut dyn FnMut([[f64; 3]; 2])) {
-    let dot = |a: [f64; 3], b: [f64; 3]| (0..3).map(|k| a[k] * b[k]).sum::<f64>();
-    let pull = dot(gravity, gravity).sqrt();
+    let pull = norm(gravity);
     let up = gravity.map(|g| -g / pull);
-    let between = [0, 1, 2].map(|k| to[k] - from[k]);
+    let between = sub(to, from);
     let rise = dot(between, up);
-    let level = [0, 1, 2].map(|k| between[k] - rise * up[k]);
-    let run = dot(level, level).sqrt();
-    if length <= dot(between, between).sqrt() {
+    let level = sub(between, scale(up, rise));
+    let run = norm(level);
+    if length <= norm(between) {
         return each([from, to]);
     }
     let across = if run > 1e-15 { level.map(|x| x / run) } else { [0.0; 3] };

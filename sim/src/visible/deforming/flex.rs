@@ -8,7 +8,7 @@ use super::{Scratch, Segment};
 use kinetoscope_mujoco::{Data, FlexArrays};
 use kinetoscope_scene::mesh::TriMesh;
 use kinetoscope_scene::shape::smooth_normals;
-use kinetoscope_scene::vector::{cross, norm, sub};
+use kinetoscope_scene::vector::{cross, sub, try_normalize};
 use std::collections::HashMap;
 
 /// Flex of one dimension.
@@ -165,10 +165,7 @@ impl Cloth {
 
 /// Computes the mean of the unit normals of the triangles around each vertex, normalized to length 1.
 fn mean_normals(positions: &[[f32; 3]], triangles: &[[u32; 3]], normals: &mut [[f32; 3]]) {
-    let unit = |v: [f64; 3]| {
-        let length = norm(v);
-        if length > 0.0 { v.map(|x| x / length) } else { [0.0; 3] }
-    };
+    let unit = |v: [f64; 3]| try_normalize(v, 0.0).unwrap_or_default();
     normals.fill([0.0; 3]);
     for triangle in triangles {
         let [p, q, r] = triangle.map(|i| positions[i as usize].map(f64::from));

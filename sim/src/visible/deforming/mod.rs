@@ -21,6 +21,7 @@ use kinetoscope_look::ModelMaterials;
 use kinetoscope_mujoco::{Data, Model};
 use kinetoscope_scene::shape::RenderMesh;
 use kinetoscope_scene::shape::{Capsule, Mesh};
+use kinetoscope_scene::vector::{norm, sub};
 use kinetoscope_scene::{Instance, Material, PoseF32, RenderScene, RenderSceneError};
 use std::sync::Arc;
 
@@ -241,8 +242,8 @@ impl Segment {
     /// Pose of the capsule in the world: its axis is rotated from z by the smallest angle.
     fn pose(&self) -> PoseF32 {
         let [from, to] = self.ends;
-        let along = [0, 1, 2].map(|k| to[k] - from[k]);
-        let length = along.iter().map(|x| x * x).sum::<f64>().sqrt();
+        let along = sub(to, from);
+        let length = norm(along);
         let [x, y, z] = if length > 0.0 { along.map(|a| a / length) } else { [0.0, 0.0, 1.0] };
         let rotation = if z > -1.0 + 1e-12 {
             let s = 1.0 / (1.0 + z);
