@@ -4,6 +4,7 @@
 //! they may cover, infinite planes by their nearness, which is linear in the image. The image is processed in bands
 //! that stay in the cache. Items are drawn front to back, and blocks that are full of nearer surfaces are skipped.
 
+mod candidates;
 mod cluster;
 mod draw_list;
 mod lod;
