@@ -112,10 +112,10 @@ mod tests {
                 };
                 for level in all_levels() {
                     let bits = at_level!(level, s => candidates(s, &tile, &vertices, &corners[..count], cull));
-                    for k in 0..LANES {
+                    for (k, triangle) in triangles.iter().enumerate() {
                         let (is_large, is_candidate) = expected(k);
                         let wanted = k < count && (is_large || is_candidate);
-                        assert_eq!(bits >> k & 1 == 1, wanted, "{:?}, {cull}, {level:?}", triangles[k]);
+                        assert_eq!(bits >> k & 1 == 1, wanted, "{triangle:?}, {cull}, {level:?}");
                         large += usize::from(is_large);
                         *if wanted { &mut found } else { &mut left_out } += 1;
                     }
