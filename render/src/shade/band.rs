@@ -124,6 +124,10 @@ impl RasterScratch {
                 rasterizer.draw(s, tile, projection, render_request.scene, &list.placed, item);
             }
         };
+        // Blended items are drawn over a copy of the tile, with the nearness of all samples.
+        if !plan.traces_visibility && list.blended.is_empty() {
+            tile.count_items(list.opaque.iter().map(|item| item.rect));
+        }
         for item in &list.opaque {
             draw(tile, item);
         }

@@ -299,3 +299,44 @@ fn endless_plane_depth() {
     }
     assert!(seen > 100_000, "{seen}");
 }
+
+/// Blocks that a plane alone covers are not drawn sample by sample. A transparent box in the upper left corner turns this
+/// off: the other pixels are the same, bit for bit.
+#[test]
+fn blocks_of_planes() {
+    let tilted = |angle: f32| {
+        let (sine, cosine) = angle.sin_cos();
+        PoseF32 { rotation: [[cosine, 0.0, sine], [0.0, 1.0, 0.0], [-sine, 0.0, cosine]], translation: [0.1, 0.0, 0.0] }
+    };
+    for (half, angle, parallel) in [
+        ([0.0; 2], 0.0, false),
+        ([0.0; 2], 0.3, false),
+        ([1.0, 0.7], 0.2, false),
+        ([30.0, 30.0], 0.0, false),
+        ([1.0, 0.7], 0.2, true),
+        ([30.0, 30.0], -0.1, true),
+    ] {
+        let view = look_at_view([123, 91], 0.9, [3.0, 0.2, 0.8], [0.0, 0.0, 0.3]);
+        let view = if parallel { View { parallel, fx: 40.0, fy: 40.0, ..view } } else { view };
+        let scale = if parallel { 40.0 } else { view.fx };
+        let corner = view.world_from_camera.apply([(4.0 - view.cx) / scale, (4.0 - view.cy) / scale, 1.0]);
+        let draw = |with_glass: bool| {
+            let plane = (Shape::from(Plane { half }), matte([0.7, 0.5, 0.3]), tilted(angle));
+            let ball = (Sphere { radius: 0.2 }.into(), matte([0.2, 0.6, 0.9]), translation(0.3, 0.1, 0.4));
+            let glass = Material::from_rgba([0.5, 0.5, 0.5, 0.3]);
+            let pose = PoseF32 { rotation: PoseF32::IDENTITY.rotation, translation: corner };
+            let glass = with_glass.then_some((Box { half: [0.01; 3] }.into(), glass, pose));
+            TestFrame::new(instances([plane, ball].into_iter().chain(glass)), view)
+                .with(|still| still.cfg.shadows = false)
+                .draw()
+        };
+        let (plain, glassy) = (draw(false), draw(true));
+        assert!(glassy.mask().contains(&3), "the box is visible");
+        assert!(plain.mask().contains(&1) && plain.mask().contains(&2));
+        let beside = (0..123 * 91).filter(|k| k % 123 >= 16);
+        for k in beside {
+            let seen = [&plain, &glassy].map(|image| (image.mask()[k], image.depth()[k].to_bits(), image.color()[k]));
+            assert_eq!(seen[0], seen[1], "{half:?} {angle} {parallel}: pixel {k}");
+        }
+    }
+}
