@@ -5,7 +5,7 @@ use super::harness::{Image, TestFrame};
 use crate::renderer::Renderer;
 use crate::shade::tone::ToneCurve;
 use crate::visibility::View;
-use kinetoscope_scene::shape::{Box, Capsule, Cylinder, Ellipsoid, Mesh, Plane, Shape, Sphere};
+use kinetoscope_scene::shape::{Box, Cylinder, Mesh, Plane, Shape, Sphere};
 use kinetoscope_scene::{
     Haze, Light, LightKind, LightingSpace, Material, OpenGlRules, PlaneLines, PoseF32, Tessellation, Texture,
     TextureKind,
@@ -325,57 +325,6 @@ fn light_at_corners() {
     // The formulas differ: where a corner is, they agree, in the middle of a polygon they do not.
     let middle = |image: &Image| red(image, 1.2, 0.0);
     assert!(middle(&pixels) - middle(&corners) > 2.0, "{} {}", middle(&pixels), middle(&corners));
-}
-
-/// A ball of two rows of polygons, lit from above: brightness rises linearly with the latitude, from the equator to the
-/// pole.
-#[test]
-fn light_at_corners_of_balls() {
-    let above = Light { direction: [0.0, 0.0, -1.0], cast_shadow: false, ..sun(0.9, 0.0) };
-    let shapes: [(Shape, f32); 3] = [
-        (Sphere { radius: 1.0 }.into(), 0.0),
-        (Ellipsoid { radii: [1.0; 3] }.into(), 0.0),
-        (Capsule { radius: 1.0, half_length: 0.3 }.into(), 0.3),
-    ];
-    for (shape, raised) in shapes {
-        let name = shape.name();
-        let draw = |tessellation: Option<Tessellation>| {
-            let rules = OpenGlRules { tessellation, ..RULES };
-            let ball = (shape.clone(), matte([0.5; 3]), translation(0.0, 0.0, -raised));
-            floor_and(ball, matte([0.1; 3]), Some(rules), vec![above]).draw()
-        };
-        let corners = draw(Some(Tessellation { slices: 4, stacks: 2, quads: 1 }));
-        for (x, y) in [(0.475, 0.325), (-0.625, 0.175), (0.125, -0.725), (-0.325, -0.375)] {
-            let distance: f32 = f32::hypot(x, y);
-            let latitude = distance.acos() / std::f32::consts::FRAC_PI_2;
-            let (expected, pixel) = (0.5 * 0.9 * latitude, 0.5 * 0.9 * distance.acos().sin());
-            assert_red(&corners, [x, y], expected);
-            assert_red(&draw(None), [x, y], pixel);
-            assert!(pixel - expected > 0.05, "{name}: the formulas differ");
-        }
-    }
-}
-
-/// Where a surface covers two samples of a pixel but not its middle, its color is that at the mean of both.
-///
-/// The face of a box goes from black to white over two pixels, from row to row. Its left border is at the right of the middle
-/// of a pixel, by less than the offset of its samples (96, 32) and (32, -96), in 1/256 pixel.
-#[test]
-fn edges_at_the_mean_of_samples() {
-    let pixels: Vec<u8> = [255, 0].into_iter().flat_map(|byte| [byte; 3]).collect();
-    let texture = Texture::averaged_in(LightingSpace::Display, TextureKind::TwoD, 1, 2, 3, &pixels).unwrap();
-    let painted = Material { texture: Some(Arc::new(texture)), emission: 1.0, ..matte([1.0; 3]) };
-    let view = View::look_at([SIZE; 2], 0.5, [0.0, 0.0, 3.0], [0.0; 3], [0.0, 1.0, 0.0]).unwrap();
-    // Four pixels high, so that a texel is two; the middle of the image is that of a pixel.
-    let left = 0.06 / 20.0;
-    let face = (Shape::from(Box { half: [0.5, 0.1, 0.1] }), painted, translation(left + 0.5, 0.0, 0.0));
-    let mut frame = still([face], Some(RULES), Vec::new(), view);
-    frame.scene.set_face_images(0, [1.0; 2]);
-    let image = frame.draw();
-    // The mean is 32 / 256 pixel above the middle, where white is.
-    let white = 0.5 + 0.125 / 2.0;
-    assert_red(&image, [0.0, 0.0], 0.5 * white);
-    assert_red(&image, [0.1, 0.0], 0.5);
 }
 
 /// Light at the corners of triangles of a mesh and of a box: the same colors as of the shape as a mesh with those
