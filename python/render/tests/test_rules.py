@@ -212,6 +212,21 @@ def test_transparent_geoms():
     check("glass", theirs.rgb, found.rgb, control, 31)
 
 
+@pytest.mark.parametrize("angle", [12, 40])
+def test_places_of_samples(angle):
+    """Edges are mixed from samples at the places of OpenGL. A plate that leans to the other side, upside down, has the same
+    edges, but the usual places, which are OpenGL's upside down.
+    """
+    plate = """<mujoco><visual><headlight active="0"/></visual><asset><material name="m" emission="1" rgba="1 1 1 1"/></asset>
+      <worldbody><camera name="c" pos="0 -3 0" xyaxes="1 0 0 0 0 1"/>
+        <geom type="box" size=".8 .01 .6" euler="0 {} 0" material="m"/></worldbody></mujoco>"""
+    theirs, found = pair(*load(plate.format(angle)))
+    control = np.flipud(ours(*load(plate.format(-angle))))
+    edge = (theirs.rgb > 0) & (theirs.rgb < 255)
+    assert edge.sum() > 300
+    check("samples", theirs.rgb, found.rgb, control, 40)
+
+
 def test_fog():
     """Fog increases linearly."""
     visual = '<map fogstart=".5" fogend="2.5"/><rgba fog=".9 .8 .7 1"/>'

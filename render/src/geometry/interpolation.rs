@@ -15,6 +15,8 @@ pub(crate) struct SurfaceAttributes {
     pub(crate) lift: V3,
     /// Texture coordinates, and their number per meter; `None` for a mesh without.
     pub(crate) uv: Option<([f64; 2], f64)>,
+    /// Barycentric coordinates.
+    pub(crate) shares: [f64; 3],
 }
 
 /// Interpolates the attributes of a mesh at a point `at` of a triangle, all in the frame of the mesh. `side` is 1 for a
@@ -42,5 +44,5 @@ pub(crate) fn interpolate_triangle(mesh: &RenderMesh, triangle: usize, at: V3, s
         // Square root of the ratio of areas, in the texture and on the surface.
         (uv, ((p[0] * q[1] - q[0] * p[1]).abs() / area.sqrt()).sqrt())
     });
-    SurfaceAttributes { normal, lift, uv }
+    SurfaceAttributes { normal, lift, uv, shares: share }
 }

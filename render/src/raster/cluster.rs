@@ -1,5 +1,6 @@
 //! Rasterization of a cluster of triangles: transform, clip, triangle setup.
 
+use super::candidates::candidates;
 use super::tile::Tile;
 use super::triangle::{self, GUARD_BAND, Gradient, SUBPIXELS};
 use crate::simd::{LANES, Simd, abs, load, select, splat, store, store_i};
@@ -9,7 +10,9 @@ use kinetoscope_scene::shape::Cluster;
 use kinetoscope_scene::shape::RenderMesh;
 use kinetoscope_scene::vector::{cross, dot, sub};
 
-const MAX_VERTICES: usize = 3 * RenderMesh::MAX_CLUSTER_TRIANGLES;
+/// Largest number of vertices: an index of one byte needs no check. A cluster has fewer.
+const MAX_VERTICES: usize = 256;
+const _: () = assert!(3 * RenderMesh::MAX_CLUSTER_TRIANGLES <= MAX_VERTICES);
 /// Adding and subtracting this rounds to an integer (below 2^22). `round()` would be a library call.
 const ROUND: f32 = 12_582_912.0;
 
@@ -19,6 +22,8 @@ pub(crate) struct Vertices {
     camera: [[f32; MAX_VERTICES]; 3],
     screen: [[f32; MAX_VERTICES]; 2],
     snapped: [[i32; MAX_VERTICES]; 2],
+    /// The numbers of `snapped`.
+    pub(super) grid: [[f32; MAX_VERTICES]; 2],
     nearness: [f32; MAX_VERTICES],
     /// 1 if the vertex must be clipped, else 0.
     clip: [f32; MAX_VERTICES],
@@ -30,6 +35,7 @@ impl Default for Vertices {
             camera: [[0.0; MAX_VERTICES]; 3],
             screen: [[0.0; MAX_VERTICES]; 2],
             snapped: [[0; MAX_VERTICES]; 2],
+            grid: [[0.0; MAX_VERTICES]; 2],
             nearness: [0.0; MAX_VERTICES],
             clip: [0.0; MAX_VERTICES],
         }
@@ -59,33 +65,40 @@ pub(crate) fn draw<S: Simd>(
     let all_good = transform(s, v, mesh, cluster, pass);
     let nearest = pass.projection.nearest();
     let first = cluster.first as usize;
-    for k in first..first + cluster.count as usize {
-        let [a, b, c] = mesh.corners()[k];
-        let corners = [usize::from(a), usize::from(b), usize::from(c)];
-        let id = pass.first_id + k as u32;
-        if !all_good && corners.iter().any(|&i| v.clip[i] != 0.0) {
-            draw_clipped(s, tile, v, corners, pass, id);
-            continue;
+    let corners_of = &mesh.corners()[first..first + cluster.count as usize];
+    for (group, corners_of) in corners_of.chunks(LANES).enumerate() {
+        let everything = (1 << corners_of.len()) - 1;
+        let mut left = if all_good { candidates(s, tile, v, corners_of, pass.cull) } else { everything };
+        while left != 0 {
+            let k = left.trailing_zeros() as usize % LANES;
+            left &= left - 1;
+            let corners = corners_of[k].map(usize::from);
+            let id = pass.first_id + (first + group * LANES + k) as u32;
+            if !all_good && corners.iter().any(|&i| v.clip[i] != 0.0) {
+                draw_clipped(s, tile, v, corners, pass, id);
+                continue;
+            }
+            let snapped = |i: usize| [v.snapped[0][i], v.snapped[1][i]];
+            let mut p = [snapped(corners[0]), snapped(corners[1]), snapped(corners[2])];
+            let double =
+                |a: [i32; 2], b: [i32; 2]| i64::from(a[0]) * i64::from(b[1]) - i64::from(a[1]) * i64::from(b[0]);
+            let edge = |k: usize| [p[k][0] - p[0][0], p[k][1] - p[0][1]];
+            let area = double(edge(1), edge(2));
+            // The image's y axis points down, so front faces are clockwise: negative area.
+            if area == 0 || (area > 0 && pass.cull) {
+                continue;
+            }
+            if area < 0 {
+                p.swap(1, 2);
+            }
+            let plane = || {
+                let seen = |i: usize| [v.camera[0][i], v.camera[1][i], v.camera[2][i]];
+                let camera = [seen(corners[0]), seen(corners[1]), seen(corners[2])];
+                let at = [v.screen[0][corners[0]], v.screen[1][corners[0]]];
+                gradient(pass.projection, camera, at, corners.map(|i| v.nearness[i]).as_slice())
+            };
+            triangle::draw(s, tile, p, plane, nearest, id);
         }
-        let snapped = |i: usize| [v.snapped[0][i], v.snapped[1][i]];
-        let mut p = [snapped(corners[0]), snapped(corners[1]), snapped(corners[2])];
-        let double = |a: [i32; 2], b: [i32; 2]| i64::from(a[0]) * i64::from(b[1]) - i64::from(a[1]) * i64::from(b[0]);
-        let edge = |k: usize| [p[k][0] - p[0][0], p[k][1] - p[0][1]];
-        let area = double(edge(1), edge(2));
-        // The image's y axis points down, so front faces are clockwise: negative area.
-        if area == 0 || (area > 0 && pass.cull) {
-            continue;
-        }
-        if area < 0 {
-            p.swap(1, 2);
-        }
-        let plane = || {
-            let seen = |i: usize| [v.camera[0][i], v.camera[1][i], v.camera[2][i]];
-            let camera = [seen(corners[0]), seen(corners[1]), seen(corners[2])];
-            let at = [v.screen[0][corners[0]], v.screen[1][corners[0]]];
-            gradient(pass.projection, camera, at, corners.map(|i| v.nearness[i]).as_slice())
-        };
-        triangle::draw(s, tile, p, plane, nearest, id);
     }
 }
 
@@ -121,6 +134,7 @@ fn transform<S: Simd>(s: S, v: &mut Vertices, mesh: &RenderMesh, cluster: &Clust
             let value = select(good, value, zero);
             store(value, &mut v.screen[k][i..]);
             let snapped = (value * SUBPIXELS + ROUND) - ROUND;
+            store(snapped, &mut v.grid[k][i..]);
             store_i(snapped.to_int(), &mut v.snapped[k][i..]);
         }
         store(select(good, zero, splat(s, 1.0)), &mut v.clip[i..]);

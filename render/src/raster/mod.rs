@@ -4,6 +4,7 @@
 //! they may cover, infinite planes by their nearness, which is linear in the image. The image is processed in bands
 //! that stay in the cache. Items are drawn front to back, and blocks that are full of nearer surfaces are skipped.
 
+mod candidates;
 mod cluster;
 mod draw_list;
 mod lod;
@@ -17,7 +18,7 @@ use cluster::{ClusterPass, Vertices};
 pub use draw_list::Layer;
 pub(crate) use draw_list::{DrawItem, DrawList, Granularity, PlacedInstance};
 use kinetoscope_scene::RenderScene;
-use kinetoscope_scene::shape::Shape;
+use kinetoscope_scene::shape::{Plane, Shape};
 pub(crate) use lod::{largest_shift, select_level};
 use tile::{BLOCK, NO_ID, Tile};
 
@@ -112,7 +113,16 @@ fn draw_infinite_plane<S: Simd>(
     for by in area[1]..=area[3] {
         for bx in area[0]..=area[2] {
             let block = tile.block(bx, by);
-            // Most of a floor is the first item in its blocks, which then need no comparison.
+            match coverage(s, projection, placed, [0.0; 2], [bx, by]) {
+                Coverage::None => continue,
+                // Most of a floor is the only item in its blocks.
+                Coverage::All if tile.has_one_item(block) => {
+                    tile.fill_uniform(block, first_id);
+                    continue;
+                }
+                _ => {}
+            }
+            // Elsewhere, it is mostly the first item in its blocks, which then need no comparison.
             let empty = tile.take_cleared(block);
             let mut drawn = false;
             let offsets = tile.offsets;
@@ -146,6 +156,39 @@ fn draw_infinite_plane<S: Simd>(
     }
 }
 
+/// Part of a block that a plane covers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Coverage {
+    None,
+    Part,
+    All,
+}
+
+/// Part of a block and of one pixel around it that a plane with these half sizes (0 for infinite ones) covers, in front of
+/// the far plane and behind the near plane. It covers a convex part of the image, so the corners are sufficient for all of
+/// a block. None of a block is covered if its corners are above the horizon; other blocks may count as a part.
+#[inline(always)]
+fn coverage<S: Simd>(
+    s: S,
+    projection: &Projection,
+    placed: &PlacedInstance,
+    half: [f32; 2],
+    [bx, by]: [usize; 2],
+) -> Coverage {
+    let ends = |first: usize| [(first * BLOCK) as f32 - 1.0, ((first + 1) * BLOCK) as f32 + 1.0];
+    let ([left, right], [top, bottom]) = (ends(bx), ends(by));
+    let is_first = load(s, &COLUMN).simd_lt(splat(s, 3.5));
+    let u = select(is_first, splat(s, left), splat(s, right));
+    let v = select(load(s, &ROW).simd_lt(splat(s, 0.5)), splat(s, top), splat(s, bottom));
+    let (o, d) = projection.rays(s, &placed.local, u, v);
+    if d.z.simd_ge(splat(s, 0.0)).all_true() {
+        return Coverage::None;
+    }
+    let hit = primitive::intersect(s, &Shape::Plane(Plane { half }), o, d, projection.near);
+    let is_visible = hit.hit & hit.t.simd_lt(splat(s, projection.far));
+    if is_visible.all_true() { Coverage::All } else { Coverage::Part }
+}
+
 /// Keeps the samples that are nearer than the stored ones, or as near with a larger id. Returns true if any is kept.
 #[inline(always)]
 fn depth_test<S: Simd>(s: S, tile: &mut Tile, at: usize, hit: M<S>, nearness: F<S>, id: U<S>) -> bool {
@@ -161,8 +204,8 @@ fn depth_test<S: Simd>(s: S, tile: &mut Tile, at: usize, hit: M<S>, nearness: F<
     nearer.any_true()
 }
 
-/// Bounds of a round shape in a parallel projection: a line, and the distance from it \[pixels\]. Most blocks around a long
-/// slanted capsule miss it.
+/// Bounds of a round shape in the image: a line, and the distance from it \[pixels\]. Most blocks around a long slanted
+/// capsule miss it.
 #[derive(Clone, Copy, Debug)]
 struct Outline {
     ends: [[f32; 2]; 2],
@@ -173,7 +216,7 @@ impl Outline {
     /// Distance of the corners of a block from its middle, and of the samples of a pixel from it \[pixels\], rounded up.
     const BLOCK_REACH: f32 = 7.0;
 
-    /// The bounds of a shape; `None` for other shapes, and in perspective.
+    /// The bounds of a shape; `None` for other shapes, and in perspective for shapes that reach behind the camera.
     #[inline(always)]
     fn of(shape: &Shape, placed: &PlacedInstance, projection: &Projection) -> Option<Self> {
         let (radius, half) = match shape {
@@ -182,12 +225,23 @@ impl Outline {
             Shape::Cylinder(cylinder) => (cylinder.radius, cylinder.half_length),
             _ => return None,
         };
-        let end = |z: f32| {
-            let [x, y, _] = placed.camera_from_instance.apply([0.0, 0.0, z]);
-            [x * projection.fx + projection.cx, y * projection.fy + projection.cy]
-        };
-        let reach = 1.0001 * radius * projection.fx.max(projection.fy) + Self::BLOCK_REACH;
-        projection.parallel.then(|| Self { ends: [end(-half), end(half)], reach })
+        let ends = [-half, half].map(|z| placed.camera_from_instance.apply([0.0, 0.0, z]));
+        let mut widest = radius;
+        let mut slopes = ends.map(|[x, y, _]| [x, y]);
+        if !projection.parallel {
+            // A point at the slopes k and the depth z that is moved by up to r moves by up to r √(1 + k²) / (z - r) on a
+            // plane at the depth 1.
+            let depth = 0.9999 * ends[0][2].min(ends[1][2]) - radius;
+            if depth <= 0.0 {
+                return None;
+            }
+            slopes = ends.map(|[x, y, z]| [x / z, y / z]);
+            let square = slopes.map(|[x, y]| x * x + y * y);
+            widest = radius * (1.0 + square[0].max(square[1])).sqrt() / depth;
+        }
+        let ends = slopes.map(|[x, y]| [x * projection.fx + projection.cx, y * projection.fy + projection.cy]);
+        let reach = 1.0001 * widest * projection.fx.max(projection.fy) + Self::BLOCK_REACH;
+        Some(Self { ends, reach })
     }
 
     /// True if no sample of a block is within the bounds.
@@ -221,6 +275,16 @@ fn draw_primitive<S: Simd>(
     for by in area[1]..=area[3] {
         for bx in area[0]..=area[2] {
             let block = tile.block(bx, by);
+            if let Shape::Plane(plane) = shape {
+                match coverage(s, projection, placed, plane.half, [bx, by]) {
+                    Coverage::None => continue,
+                    Coverage::All if tile.has_one_item(block) => {
+                        tile.fill_uniform(block, first_id);
+                        continue;
+                    }
+                    _ => {}
+                }
+            }
             if tile.is_occluded(block, item.nearness) || outline.is_some_and(|outline| outline.misses([bx, by])) {
                 continue;
             }
@@ -255,5 +319,60 @@ fn draw_primitive<S: Simd>(
                 tile.mark_dirty(block);
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::visibility::View;
+    use kinetoscope_scene::PoseF32;
+    use kinetoscope_scene::shape::{Capsule, Cylinder, Sphere};
+
+    /// The blocks at all points of round shapes are within their bounds, in both projections; other blocks are not.
+    #[test]
+    fn outlines() {
+        let mut rng = crate::geometry::TestRng(3);
+        let (mut points, mut missed) = (0, 0);
+        for round in 0..300 {
+            let (radius, half) = (0.05 + 0.2 * (rng.point(1.0)[0].abs() as f32), 0.5 * rng.point(1.0)[1].abs() as f32);
+            let shape: Shape = match round % 3 {
+                0 => Sphere { radius }.into(),
+                1 => Capsule { radius, half_length: half }.into(),
+                _ => Cylinder { radius, half_length: half }.into(),
+            };
+            let at = rng.point(1.0).map(|x| x as f32);
+            let axis = rng.point(1.0).map(|x| x as f32);
+            let mut view = View::look_at([200, 150], 0.9, [2.5, 0.0, 0.5], [0.0; 3], axis).unwrap();
+            view.parallel = round % 2 == 0;
+            if view.parallel {
+                (view.fx, view.fy) = (70.0, 90.0);
+            }
+            let projection = Projection::from(&view);
+            let pose = PoseF32 { rotation: view.world_from_camera.rotation, translation: at };
+            // Turned like the camera, and then about an axis.
+            let tilt = View::look_at([8, 8], 0.9, axis, at, [0.3, 0.2, 1.0]).unwrap().world_from_camera.rotation;
+            let pose = PoseF32 { rotation: if round % 5 == 0 { pose.rotation } else { tilt }, translation: at };
+            let camera_from_instance = projection.world_from_camera.inverse_times(&pose);
+            let local = projection.local(&pose);
+            let placed =
+                PlacedInstance { camera_from_instance, local, outside: true, culls_backs: false, level: 0, error: 0.0 };
+            let Some(outline) = Outline::of(&shape, &placed, &projection) else { continue };
+            for _ in 0..200 {
+                let off = rng.point(1.0).map(|x| x as f32);
+                let length = off.iter().map(|x| x * x).sum::<f32>().sqrt().max(0.1);
+                let height = if round % 3 == 0 { 0.0 } else { half * rng.point(1.0)[2] as f32 };
+                let surface = [0, 1, 2].map(|k| radius * off[k] / length + if k == 2 { height } else { 0.0 });
+                let [x, y, z] = camera_from_instance.apply(surface);
+                let by = if view.parallel { 1.0 } else { z };
+                let pixel = [x / by * view.fx + view.cx, y / by * view.fy + view.cy];
+                if pixel.iter().all(|&p| p >= 0.0) {
+                    points += 1;
+                    assert!(!outline.misses(pixel.map(|p| p as usize / BLOCK)), "{} {pixel:?}", shape.name());
+                }
+            }
+            missed += (0..25 * 19).filter(|k| outline.misses([k % 25, k / 25])).count();
+        }
+        assert!(points > 20_000 && missed > 300 * 25 * 19 / 2, "{points} {missed}");
     }
 }

@@ -12,6 +12,9 @@ pub(crate) const NO_ID: u32 = u32::MAX;
 pub(crate) const SAMPLES: [[i32; 2]; 5] = [[0, 0], [-32, -96], [96, -32], [-96, 32], [32, 96]];
 /// The same grid mirrored, as in OpenGL: the rows of its images go up.
 pub(crate) const OPENGL_SAMPLES: [[i32; 2]; 5] = [[0, 0], [-32, 96], [96, 32], [-96, -32], [32, -96]];
+/// Number of items in a block that counts as many.
+const MANY: u8 = 2;
+
 /// The largest offset of a sample.
 pub(crate) const MAX_SAMPLE_OFFSET: i32 = 96;
 
@@ -36,6 +39,13 @@ pub(crate) struct Tile {
     /// True if the block is empty, whatever its memory holds. It is cleared when it is first drawn into, while it
     /// passes through the cache anyway.
     cleared: Vec<bool>,
+    /// Number of items that may cover samples of each block, up to [`MANY`].
+    items: Vec<u8>,
+    /// True for blocks whose samples all have the id of their plane 0, which is the only plane in memory. Nothing is drawn
+    /// into them any more, so they need no nearness.
+    uniform: Vec<bool>,
+    /// True if `items` are counted.
+    is_counted: bool,
     /// Nearness of an empty sample.
     empty: f32,
     /// The only row of each block that rays are cast for; `None` for all rows.
@@ -51,6 +61,8 @@ impl Tile {
         self.farthest.reserve_exact(blocks.saturating_sub(self.farthest.len()));
         self.dirty.reserve_exact(blocks.saturating_sub(self.dirty.len()));
         self.cleared.reserve_exact(blocks.saturating_sub(self.cleared.len()));
+        self.items.reserve_exact(blocks.saturating_sub(self.items.len()));
+        self.uniform.reserve_exact(blocks.saturating_sub(self.uniform.len()));
     }
 
     /// Moves the tile and empties it. Call [`finish`](Self::finish) before reading it.
@@ -66,12 +78,50 @@ impl Tile {
             self.nearness.resize(samples, farthest);
             self.id.resize(samples, NO_ID);
         }
-        for (flags, value) in [(&mut self.dirty, false), (&mut self.cleared, true)] {
+        for (flags, value) in [(&mut self.dirty, false), (&mut self.cleared, true), (&mut self.uniform, false)] {
             flags.clear();
             flags.resize(count, value);
         }
+        self.items.clear();
+        self.items.resize(count, MANY);
+        self.is_counted = false;
         self.farthest.clear();
         self.farthest.resize(count, farthest);
+    }
+
+    /// Counts the items that may cover each block, given by their rectangles of blocks. No other item may be drawn.
+    pub(crate) fn count_items(&mut self, rects: impl Iterator<Item = [u16; 4]>) {
+        self.items.fill(0);
+        self.is_counted = true;
+        for rect in rects {
+            let Some([x0, y0, x1, y1]) = self.overlap(rect) else { continue };
+            for by in y0..=y1 {
+                let (first, last) = (self.block(x0, by), self.block(x1, by));
+                for count in &mut self.items[first..=last] {
+                    *count = (*count + 1).min(MANY);
+                }
+            }
+        }
+    }
+
+    /// True if only one item may cover samples of a block.
+    #[inline(always)]
+    pub(crate) fn has_one_item(&self, block: usize) -> bool {
+        self.items[block] == 1
+    }
+
+    /// Fills a block that no other item covers with an id.
+    #[inline(always)]
+    pub(crate) fn fill_uniform(&mut self, block: usize, id: u32) {
+        let first = self.samples(block, 0);
+        self.id[first..first + BLOCK_AREA].fill(id);
+        (self.cleared[block], self.uniform[block]) = (false, true);
+    }
+
+    /// True if all samples of a block have the id of their plane 0; other planes and the nearness hold anything.
+    #[inline(always)]
+    pub(crate) fn is_uniform(&self, block: usize) -> bool {
+        self.uniform[block]
     }
 
     /// Prepares a block for drawing.
@@ -100,6 +150,9 @@ impl Tile {
     /// Clears untouched blocks, so that the tile can be read.
     pub(crate) fn finish(&mut self) {
         for block in 0..self.cleared.len() {
+            if self.cleared[block] && self.is_counted {
+                self.fill_uniform(block, NO_ID);
+            }
             self.prepare_block(block);
         }
     }
@@ -129,7 +182,9 @@ impl Tile {
         self.farthest.clone_from(&other.farthest);
         self.dirty.clone_from(&other.dirty);
         self.cleared.clone_from(&other.cleared);
-        (self.empty, self.only_row) = (other.empty, other.only_row);
+        self.items.clone_from(&other.items);
+        self.uniform.clone_from(&other.uniform);
+        (self.empty, self.only_row, self.is_counted) = (other.empty, other.only_row, other.is_counted);
     }
 
     /// Allocated heap memory \[bytes\].
@@ -137,6 +192,8 @@ impl Tile {
         4 * (self.nearness.capacity() + self.id.capacity() + self.farthest.capacity())
             + self.dirty.capacity()
             + self.cleared.capacity()
+            + self.items.capacity()
+            + self.uniform.capacity()
     }
 
     /// Index of the block with the pixel (8 bx, 8 by) of the image.

@@ -17,6 +17,10 @@ pub(crate) const GUARD_BAND: f32 = 16000.0;
 /// Sub-pixel positions per pixel.
 pub(crate) const SUBPIXELS: f32 = 256.0;
 
+/// Largest number of pixels that are tested one after the other: sixteen at a time take longer, because they need more
+/// preparation.
+const FEW_PIXELS: i32 = 9;
+
 /// Nearness of a plane over the image, and its range on the triangle.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Gradient {
@@ -29,29 +33,28 @@ pub(crate) struct Gradient {
 }
 
 /// Rasterizes a triangle given by its snapped corners `p`, in the order in which (p1 - p0) x (p2 - p0) is positive. The
-/// gradient costs several divisions: most triangles of dense meshes lie between the samples, and return before it is
-/// computed. Samples nearer than `nearest` are not drawn.
+/// gradient costs several divisions: for a small triangle, it is computed for the first covered sample. Samples nearer
+/// than `nearest` are not drawn.
 #[inline(always)]
 pub(crate) fn draw<S: Simd>(
     s: S,
     tile: &mut Tile,
     p: [[i32; 2]; 3],
-    gradient: impl FnOnce() -> Gradient,
+    gradient: impl Fn() -> Gradient,
     nearest: f32,
     id: u32,
 ) {
-    let min3 = |k: usize| p[0][k].min(p[1][k]).min(p[2][k]);
-    let max3 = |k: usize| p[0][k].max(p[1][k]).max(p[2][k]);
+    let low = [0, 1].map(|k| p[0][k].min(p[1][k]).min(p[2][k]));
+    let high = [0, 1].map(|k| p[0][k].max(p[1][k]).max(p[2][k]));
     let reach = if tile.planes > 1 { MAX_SAMPLE_OFFSET } else { 0 };
     let (tx, ty) = (tile.x0 as i32, tile.y0 as i32);
-    let x0 = ((min3(0) - reach + 127) >> 8).max(tx);
-    let x1 = ((max3(0) + reach - 128) >> 8).min(tx + (tile.blocks_x * BLOCK) as i32 - 1);
-    let y0 = ((min3(1) - reach + 127) >> 8).max(ty);
-    let y1 = ((max3(1) + reach - 128) >> 8).min(ty + (tile.blocks_y * BLOCK) as i32 - 1);
+    let x0 = ((low[0] - reach + 127) >> 8).max(tx);
+    let x1 = ((high[0] + reach - 128) >> 8).min(tx + (tile.blocks_x * BLOCK) as i32 - 1);
+    let y0 = ((low[1] - reach + 127) >> 8).max(ty);
+    let y1 = ((high[1] + reach - 128) >> 8).min(ty + (tile.blocks_y * BLOCK) as i32 - 1);
     if x0 > x1 || y0 > y1 {
         return;
     }
-    let g = &gradient();
     let (mut a, mut b, mut c) = ([0i32; 3], [0i32; 3], [0i64; 3]);
     for k in 0..3 {
         let (from, to) = (p[k], p[(k + 1) % 3]);
@@ -61,9 +64,10 @@ pub(crate) fn draw<S: Simd>(
         c[k] =
             i64::from(dx) * i64::from(128 - from[1]) - i64::from(dy) * i64::from(128 - from[0]) - i64::from(!owns_edge);
     }
-    if (x1 - x0 + 1) * (y1 - y0 + 1) <= 4 {
-        return few_pixels(tile, [x0, y0, x1, y1], a, b, c, g, nearest, id);
+    if (x1 - x0 + 1) * (y1 - y0 + 1) <= FEW_PIXELS {
+        return few_pixels(tile, [x0, y0, x1, y1], [low, high], [a, b], c, gradient, nearest, id);
     }
+    let g = &gradient();
     let offsets = tile.offsets;
     let one_block = x0 >> 3 == x1 >> 3 && y0 >> 3 == y1 >> 3;
     let column = COLUMN.map(|x| x as i32);
@@ -82,7 +86,6 @@ pub(crate) fn draw<S: Simd>(
         for bx in x0 >> 3..=x1 >> 3 {
             let (x, y) = (bx * 8, by * 8);
             let block = tile.block(bx as usize, by as usize);
-            tile.prepare_block(block);
             let first_row = ((y0.max(y) - y) >> 1) as usize;
             let last_row = ((y1.min(y + 7) - y) >> 1) as usize;
             let corner = g.at[2] + g.step[0] * (x as f32 + 0.5 - g.at[0]) + g.step[1] * (y as f32 + 0.5 - g.at[1]);
@@ -99,6 +102,8 @@ pub(crate) fn draw<S: Simd>(
                 if outside && !one_block {
                     continue;
                 }
+                // Most blocks in the bounds of a long slanted triangle are outside, and stay empty.
+                tile.prepare_block(block);
                 let q0 = corner
                     + (g.step[0] * (offset[0] as f32 * (1.0 / SUBPIXELS))
                         + g.step[1] * (offset[1] as f32 * (1.0 / SUBPIXELS)));
@@ -131,33 +136,41 @@ pub(crate) fn draw<S: Simd>(
     }
 }
 
-/// At most four pixels, one after the other; the same values as in [`draw`].
+/// At most [`FEW_PIXELS`] pixels, one after the other; the same values as in [`draw`].
 #[inline(always)]
 #[expect(clippy::too_many_arguments, reason = "inlined into its only caller")]
 fn few_pixels(
     tile: &mut Tile,
     [x0, y0, x1, y1]: [i32; 4],
-    a: [i32; 3],
-    b: [i32; 3],
+    [low, high]: [[i32; 2]; 2],
+    [a, b]: [[i32; 3]; 2],
     c: [i64; 3],
-    g: &Gradient,
+    gradient: impl Fn() -> Gradient,
     nearest: f32,
     id: u32,
 ) {
     let offsets = tile.offsets;
+    let mut found = None;
     for (plane, offset) in offsets.iter().enumerate().take(tile.planes) {
+        // Pixels whose samples are in the bounds of the triangle: mostly none.
+        let (x0, x1) = (x0.max((low[0] - offset[0] + 127) >> 8), x1.min((high[0] - offset[0] - 128) >> 8));
+        let (y0, y1) = (y0.max((low[1] - offset[1] + 127) >> 8), y1.min((high[1] - offset[1] - 128) >> 8));
+        if x0 > x1 || y0 > y1 {
+            continue;
+        }
         let start: [i64; 3] = std::array::from_fn(|k| {
             (c[k] + i64::from(a[k]) * i64::from(offset[0]) + i64::from(b[k]) * i64::from(offset[1])) >> 8
         });
-        let shift =
-            g.step[0] * (offset[0] as f32 * (1.0 / SUBPIXELS)) + g.step[1] * (offset[1] as f32 * (1.0 / SUBPIXELS));
         for y in y0..=y1 {
             for x in x0..=x1 {
                 let at = |k: usize| start[k] + i64::from(a[k]) * i64::from(x) + i64::from(b[k]) * i64::from(y);
                 if (at(0) | at(1) | at(2)) < 0 {
                     continue;
                 }
+                let g: &Gradient = found.get_or_insert_with(&gradient);
                 // The additions have the order of the wide path: corner of the block, sample, row pair, lane.
+                let shift = g.step[0] * (offset[0] as f32 * (1.0 / SUBPIXELS))
+                    + g.step[1] * (offset[1] as f32 * (1.0 / SUBPIXELS));
                 let (bx, by) = (x & !7, y & !7);
                 let corner =
                     g.at[2] + g.step[0] * (bx as f32 + 0.5 - g.at[0]) + g.step[1] * (by as f32 + 0.5 - g.at[1]);

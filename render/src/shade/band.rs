@@ -1,5 +1,6 @@
 //! Rendering of a band of an image: from the draw list to the pixels of all channels.
 
+use super::corner_light::LitPolygons;
 use super::group::{Colors, SamplePositions, resolve};
 use super::multisample::{EdgeSamples, blend};
 use super::prepared_frame::PreparedFrame;
@@ -29,6 +30,7 @@ pub(crate) struct RasterScratch {
     shade_stack: TraversalStack,
     colors: Vec<Colors>,
     edges: EdgeSamples,
+    lit_polygons: LitPolygons,
 }
 
 impl RasterScratch {
@@ -43,6 +45,7 @@ impl RasterScratch {
             shade_stack: TraversalStack::default(),
             colors: Vec::new(),
             edges: EdgeSamples::default(),
+            lit_polygons: LitPolygons::default(),
         }
     }
 
@@ -53,6 +56,7 @@ impl RasterScratch {
             + size_of::<VisibilityRasterizer>()
             + self.colors.capacity() * size_of::<Colors>()
             + self.edges.bytes()
+            + self.lit_polygons.bytes()
             + self.stack.bytes()
             + self.shade_stack.bytes()
     }
@@ -81,6 +85,7 @@ impl RasterScratch {
         // Shadow maps may be rendered later: memory is reserved once.
         self.tile.reserve(plan.max_shadow_band_samples());
         self.tile.only_row = plan.only_row;
+        plan.clear_lit_polygons(&mut self.lit_polygons);
         for first in rows.clone().step_by(step) {
             let size = [wide, step.min(rows.end - first)];
             self.tile.clear([0, first * BLOCK], size, plan.planes, projection.farthest());
@@ -109,7 +114,7 @@ impl RasterScratch {
         frame: &mut FrameMut<'_>,
         top: usize,
     ) {
-        let Self { tile, layer, blended_tile, rasterizer, stack, shade_stack, colors, edges, .. } = self;
+        let Self { tile, layer, blended_tile, rasterizer, stack, shade_stack, colors, edges, lit_polygons, .. } = self;
         let list = &plan.list;
         let view = CameraView {
             projection,
@@ -124,6 +129,10 @@ impl RasterScratch {
                 rasterizer.draw(s, tile, projection, render_request.scene, &list.placed, item);
             }
         };
+        // Blended items are drawn over a copy of the tile, with the nearness of all samples.
+        if !plan.traces_visibility && list.blended.is_empty() {
+            tile.count_items(list.opaque.iter().map(|item| item.rect));
+        }
         for item in &list.opaque {
             draw(tile, item);
         }
@@ -131,8 +140,8 @@ impl RasterScratch {
         let wanted = [Stage::Surface, Stage::Albedo, Stage::Flow].map(|stage| frame.wants(stage));
         let [wants_detail, wants_albedo, wants_flow] = wanted;
         // Shading has shared references only, so its stack is in a cell.
-        let shade_stack = RefCell::new(shade_stack);
-        let context = plan.context(render_request, projection, &shade_stack, wanted);
+        let (shade_stack, lit_polygons) = (RefCell::new(shade_stack), RefCell::new(lit_polygons));
+        let context = plan.context(render_request, projection, &shade_stack, &lit_polygons, wanted);
         let veils = !list.blended.is_empty();
         if veils {
             blended_tile.copy(tile);

@@ -1,5 +1,6 @@
 //! Shading of sixteen samples: finds their instances, and computes each channel.
 
+use super::corner_light::{LitPolygons, PolygonSource, light_at_corners};
 use super::light::{ShadeContext, ViewRays, albedo, shade, sky};
 use super::mirror::{MirrorSamples, Mirrors};
 use super::motion_vectors::MotionVectors;
@@ -14,6 +15,7 @@ use crate::simd::{
 };
 use crate::visibility::Projection;
 use kinetoscope_scene::PoseF32;
+use std::cell::RefCell;
 
 /// State that all pixels of a frame share.
 #[derive(Clone, Copy, Debug)]
@@ -32,6 +34,8 @@ pub(crate) struct ShadingContext<'a> {
     pub(crate) albedo: bool,
     /// Motion vectors, if channels of [`Stage::Flow`](crate::frame::Stage::Flow) are rendered.
     pub(crate) motion_vectors: Option<&'a MotionVectors>,
+    /// Light at the corners of polygons, if it is computed there.
+    pub(crate) lit_polygons: Option<&'a RefCell<&'a mut LitPolygons>>,
 }
 
 impl<'a> ShadingContext<'a> {
@@ -194,11 +198,13 @@ fn resolve_lanes<S: Simd>(
         if colors.is_some() {
             let ShadeContext { lighting, pixel, .. } = context.shade;
             let rays = ViewRays { direction: view, distance: at.t * length };
-            let corners = lighting.polygons.is_in_use().then(|| {
+            let corner_light = context.lit_polygons.map(|table| {
                 let triangles = list.map(|id| id.wrapping_sub(source.first_id));
-                lighting.polygons.corners(s, &source, source.placed.mesh(source.instance), &triangles, &at, here)
+                let mesh = source.placed.mesh(source.instance);
+                let polygons = PolygonSource { index: last as u32, source: &source, mesh };
+                light_at_corners(s, &context.shade, table, polygons, &triangles, &at, rays, true, 1.0, here)
             });
-            let mut seen = shade(s, &context.shade, &source, &at, corners.as_ref(), rays, 1.0, here);
+            let mut seen = shade(s, &context.shade, &source, &at, corner_light, rays, 1.0, here);
             if let Some(mirrors) = context.mirrors.filter(|mirrors| mirrors.has(last, source.instance)) {
                 let samples = MirrorSamples { point: at.point(), view, length, color: seen };
                 seen = mirrors.reflect(s, context, &source, samples, here);

@@ -1,7 +1,7 @@
 //! Shading of the rasterizer: light that a surface reflects towards the camera.
 
 use super::horizon::Horizon;
-use super::polygons::{CornerLanes, PolygonTables};
+use super::polygons::PolygonTables;
 use super::shadow::ShadowMap;
 use super::shadow_rays::ShadowRays;
 use super::surface::{InstanceSurface, Surface};
@@ -18,22 +18,23 @@ pub(crate) const MAX_LIGHTS: usize = 16;
 
 /// A light prepared for a frame.
 #[derive(Clone, Copy, Debug)]
-struct PreparedLight {
-    light: Light,
+pub(super) struct PreparedLight {
+    pub(super) light: Light,
     /// Unit vector along which the light shines.
-    along: [f32; 3],
+    pub(super) along: [f32; 3],
     cutoff_cos: f32,
     exponent: u32,
-    shadow: Option<usize>,
+    /// Index of the light's shadow map.
+    pub(super) shadow: Option<usize>,
     /// True if the light is a drawing pass of its own, as lights with shadows are in MuJoCo's renderer: its light is
     /// clamped before it is added to that of other passes.
-    own_pass: bool,
+    pub(super) own_pass: bool,
 }
 
 /// Inputs of shading besides the surface, prepared once per frame.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Lighting {
-    lights: Vec<PreparedLight>,
+    pub(super) lights: Vec<PreparedLight>,
     zenith: [f32; 3],
     horizon: [f32; 3],
     nadir: [f32; 3],
@@ -120,7 +121,7 @@ impl PreparedLight {
     /// Direction to the light (unit) and the fraction of its light that reaches points, without shadows; `None` if all
     /// points are outside of the cone of a spot.
     #[inline(always)]
-    fn illumination<S: Simd>(&self, s: S, position: V3<S>, lanes: M<S>) -> Option<(V3<S>, F<S>)> {
+    pub(super) fn illumination<S: Simd>(&self, s: S, position: V3<S>, lanes: M<S>) -> Option<(V3<S>, F<S>)> {
         let (light, zero, one) = (&self.light, splat(s, 0.0), splat(s, 1.0));
         if light.kind == LightKind::Directional {
             let [x, y, z] = self.along;
@@ -201,6 +202,11 @@ impl Lighting {
             own_pass: false,
         }));
     }
+
+    /// Number of drawing passes: one for all lights without shadows, and one for each of the others.
+    pub(crate) fn passes(&self) -> usize {
+        1 + self.lights.iter().filter(|prepared| prepared.own_pass).count()
+    }
 }
 
 /// The exponent of a spot, rounded to an integer, up to OpenGL's largest.
@@ -241,31 +247,31 @@ const FAINT_ROOT: [f32; 129] = {
 
 /// Specular highlight of a surface.
 #[derive(Clone, Copy)]
-struct Highlight {
-    strength: f32,
-    exponent: u32,
+pub(super) struct Highlight {
+    pub(super) strength: f32,
+    pub(super) exponent: u32,
     /// Cosines below this give no highlight.
-    faint: f32,
+    pub(super) faint: f32,
 }
 
 impl Highlight {
     /// The highlight of a material. A metal mirrors lights as it mirrors everything, whatever the `specular` of its
     /// nonmetallic part, except in MuJoCo's light model (`display`).
-    fn from_material(material: &Material, display: bool) -> Self {
+    pub(super) fn from_material(material: &Material, display: bool) -> Self {
         let exponent = (material.exponent() + 0.5) as u32;
         let strength = if material.metallic > 0.0 && !display { 1.0 } else { material.specular };
         Self { strength, exponent, faint: FAINT_ROOT[exponent as usize] }
     }
 
     /// True if the highlight is visible in a light of this specular color.
-    fn is_visible(&self, specular: [f32; 3]) -> bool {
+    pub(super) fn is_visible(&self, specular: [f32; 3]) -> bool {
         self.strength != 0.0 && specular.iter().any(|&x| x != 0.0)
     }
 }
 
 /// x to an integer power, by squaring.
 #[inline(always)]
-fn power<S: Simd>(s: S, x: F<S>, mut exponent: u32) -> F<S> {
+pub(super) fn power<S: Simd>(s: S, x: F<S>, mut exponent: u32) -> F<S> {
     let (mut result, mut square) = (splat(s, 1.0), x);
     while exponent > 0 {
         if exponent & 1 == 1 {
@@ -279,7 +285,7 @@ fn power<S: Simd>(s: S, x: F<S>, mut exponent: u32) -> F<S> {
 
 /// 1 from one half on, else 0.
 #[inline(always)]
-fn whole<S: Simd>(s: S, x: F<S>) -> F<S> {
+pub(super) fn whole<S: Simd>(s: S, x: F<S>) -> F<S> {
     select(x.simd_ge(splat(s, 0.5)), splat(s, 1.0), splat(s, 0.0))
 }
 
@@ -325,7 +331,7 @@ fn skybox<S: Simd>(s: S, image: &Texture, lighting: &Lighting, direction: V3<S>,
 }
 
 /// Color of a surface, in the [`BlendSpace`] of the frame. `tint` multiplies the color of the surface, but not its
-/// highlights. With `corners`, light is computed there.
+/// highlights. With `corner_light`, light was computed at the corners of polygons.
 #[inline(always)]
 #[expect(clippy::too_many_arguments, reason = "inlined into its callers")]
 pub(crate) fn shade<S: Simd>(
@@ -333,7 +339,7 @@ pub(crate) fn shade<S: Simd>(
     context: &ShadeContext<'_>,
     source: &InstanceSurface<'_>,
     at: &Surface<S>,
-    corners: Option<&CornerLanes<S>>,
+    corner_light: Option<V3<S>>,
     rays: ViewRays<S>,
     tint: f32,
     lanes: M<S>,
@@ -389,7 +395,7 @@ pub(crate) fn shade<S: Simd>(
     }
     // The sum of all further passes, each clamped.
     let mut passes = V3::splat(s, [0.0; 3]);
-    for prepared in lighting.lights.iter().filter(|_| corners.is_none()) {
+    for prepared in lighting.lights.iter().filter(|_| corner_light.is_none()) {
         let light = &prepared.light;
         let Some((to, strength)) = prepared.illumination(s, at.position, lanes) else { continue };
         let facing = max(n.dot(to), zero);
@@ -472,8 +478,8 @@ pub(crate) fn shade<S: Simd>(
     };
     let mut color = if display {
         // OpenGL clamps the sum at 1, highlights included, and multiplies the result by the texture.
-        let lit = match corners {
-            Some(corners) => light_at_corners(s, context, source, at, corners, rays, tint, lanes),
+        let lit = match corner_light {
+            Some(lit) => lit,
             None => {
                 let sum = plain(gloss);
                 V3 { x: min(max(sum.x, zero), one), y: min(max(sum.y, zero), one), z: min(max(sum.z, zero), one) }
@@ -517,107 +523,6 @@ pub(crate) fn shade<S: Simd>(
         color = color.scale(1.0 - k).add(behind.scale(k));
     }
     color
-}
-
-/// Light of a surface in MuJoCo's OpenGL renderer, which computes it at the corners of polygons, clamps it there in each
-/// pass, and interpolates; only shadows are found at every point. Without textures.
-#[inline(never)]
-#[expect(clippy::too_many_arguments, reason = "as many as its caller has")]
-fn light_at_corners<S: Simd>(
-    s: S,
-    context: &ShadeContext<'_>,
-    source: &InstanceSurface<'_>,
-    at: &Surface<S>,
-    corners: &CornerLanes<S>,
-    rays: ViewRays<S>,
-    tint: f32,
-    lanes: M<S>,
-) -> V3<S> {
-    s.vectorize(
-        #[inline(always)]
-        || {
-            let ShadeContext { scene, lighting, shadows, shadow_rays, eye, receives_shadows, .. } = *context;
-            let material = &source.instance.material;
-            let receives_shadows = receives_shadows && material.rgba[3] >= 1.0;
-            let [r, g, b, _] = material.rgba;
-            let base = [r, g, b].map(|c| c * tint);
-            let (zero, one) = (splat(s, 0.0), splat(s, 1.0));
-            let shiny = Highlight::from_material(material, true);
-            let side = splat(s, if source.instance.group == OpenGlRules::BACK_GROUP { -1.0 } else { 1.0 });
-            // Mirrored rays come from a mirrored eye.
-            let eye = match eye {
-                Some(eye) => V3::splat(s, eye),
-                None => at.position.sub(rays.direction.scale(rays.distance)),
-            };
-            let away = {
-                #[inline(always)]
-                |corner: usize| corners.positions[corner].sub(eye).unit(s)
-            };
-            // Needed by highlights only, which most materials have.
-            let away = if shiny.strength == 0.0 { corners.positions } else { [away(0), away(1), away(2)] };
-            let ambient = [0, 1, 2].map(|k| base[k] * (scene.ambient.ground[k] + material.emission));
-            let mut sums = [V3::splat(s, ambient); 3];
-            let mut passes = V3::splat(s, [0.0; 3]);
-            for prepared in &lighting.lights {
-                let light = &prepared.light;
-                let own_pass = prepared.own_pass && receives_shadows;
-                let mut pass = V3::splat(s, [0.0; 3]);
-                for (corner, sum) in sums.iter_mut().enumerate() {
-                    let position = corners.positions[corner];
-                    let normal = corners.normals[corner].scale(side);
-                    let Some((to, strength)) = prepared.illumination(s, position, lanes) else { continue };
-                    let facing = max(normal.dot(to), zero);
-                    let bright = facing * strength;
-                    let (d, a) = (light.diffuse, light.ambient);
-                    let mut lit = V3 {
-                        x: bright * (base[0] * d[0]) + strength * (base[0] * a[0]),
-                        y: bright * (base[1] * d[1]) + strength * (base[1] * a[1]),
-                        z: bright * (base[2] * d[2]) + strength * (base[2] * a[2]),
-                    };
-                    if shiny.is_visible(light.specular) {
-                        // The cosine between the normal and the half vector, compared before its root is taken.
-                        let half = to.sub(away[corner]);
-                        let (along, square) = (normal.dot(half), half.dot(half));
-                        let is_bright = (along * along).simd_gt(square * (shiny.faint * shiny.faint));
-                        let seen = lanes & is_bright & along.simd_gt(zero) & facing.simd_gt(zero);
-                        if seen.any_true() {
-                            let cosine = along / select(seen, square, one).sqrt();
-                            let shine =
-                                select(seen, power(s, cosine, shiny.exponent) * shiny.strength, zero) * strength;
-                            lit = lit.add(V3::splat(s, light.specular).scale(shine));
-                        }
-                    }
-                    if own_pass {
-                        let lit = V3 { x: min(lit.x, one), y: min(lit.y, one), z: min(lit.z, one) };
-                        pass = pass.add(lit.scale(corners.shares[corner]));
-                    } else {
-                        *sum = sum.add(lit);
-                    }
-                }
-                if !own_pass {
-                    continue;
-                }
-                let matters = lanes & max(max(pass.x, pass.y), pass.z).simd_gt(splat(s, 1e-4));
-                if !matters.any_true() {
-                    continue;
-                }
-                if let Some(map) = prepared.shadow.and_then(|k| shadows.get(k)) {
-                    pass =
-                        pass.scale(whole(s, map.visibility(s, at.position, at.normal, source.placed.error, matters)));
-                }
-                if let Some(rays) = shadow_rays.filter(|rays| rays.shadows && light.cast_shadow) {
-                    pass = pass.scale(rays.visibility(s, light, prepared.along.map(|x| -x), at.point(), matters));
-                }
-                passes = passes.add(pass);
-            }
-            let mut total = passes;
-            for (sum, share) in sums.iter().zip(corners.shares) {
-                let sum = V3 { x: min(sum.x, one), y: min(sum.y, one), z: min(sum.z, one) };
-                total = total.add(sum.scale(share));
-            }
-            total
-        },
-    )
 }
 
 /// Linear base color of a surface.

@@ -1,6 +1,7 @@
 //! Planar mirrors of rasterized images: one ray from each sample on a mirror, shaded by the rasterizer at its hit. A
 //! mirror seen in a mirror shows its own color.
 
+use super::corner_light::{PolygonSource, light_at_corners};
 use super::group::{Colors, ShadingContext};
 use super::light::{ShadeContext, ViewRays, shade, sky};
 use super::shadow_rays::{SurfacePoints, arrays, lanes_of};
@@ -10,7 +11,7 @@ use crate::geometry::bvh::TraversalStack;
 use crate::geometry::interpolation::interpolate_triangle;
 use crate::simd::{F, LANES, M, Simd, V3, abs, load, max, min, select, splat};
 use crate::trace::motion::END_TIME;
-use crate::trace::{Hit, RayTracer};
+use crate::trace::{Hit, RayTracer, RoundBounds};
 use kinetoscope_scene::Ray;
 use kinetoscope_scene::shape::Shape;
 use kinetoscope_scene::vector::{add_scaled, dot, scale, sub, to_f64};
@@ -35,27 +36,59 @@ pub(crate) struct Mirrors<'a> {
     pub(crate) only_first: bool,
     /// Bounding box of the objects that mirrored rays may hit; `None` if one of them is unbounded, or if several
     /// instances mirror.
-    pub(crate) bounds: Option<ReflectionBounds>,
+    pub(crate) bounds: Option<ReflectionBounds<'a>>,
 }
 
-/// Bounding box of the objects that mirrored rays may hit, enlarged by the error of single precision. Rays that miss
-/// the box, as from most of a floor, are not traced.
+/// Bounds of the objects that mirrored rays may hit, enlarged by the error of single precision. Rays that miss them, as from
+/// most of a floor, are not traced.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct ReflectionBounds([[f32; 3]; 2]);
+pub(crate) struct ReflectionBounds<'a> {
+    /// Bounding box of all.
+    all: [[f32; 3]; 2],
+    each: &'a [RoundBounds],
+    /// Index of the mirror, which is convex: mirrored rays do not hit it.
+    mirror: u32,
+}
 
-impl ReflectionBounds {
+impl<'a> ReflectionBounds<'a> {
     /// Enlargement of the box, as a fraction of its size and coordinates.
     const MARGIN: f64 = 1e-3;
 
-    pub(crate) fn new([lo, hi]: [[f64; 3]; 2]) -> Self {
+    pub(crate) fn new([lo, hi]: [[f64; 3]; 2], each: &'a [RoundBounds], mirror: u32) -> Self {
         let pad = (0..3).map(|k| (hi[k] - lo[k]) + lo[k].abs().max(hi[k].abs())).fold(0.0, f64::max) * Self::MARGIN;
-        Self([lo.map(|x| (x - pad) as f32), hi.map(|x| (x + pad) as f32)])
+        Self { all: [lo.map(|x| (x - pad) as f32), hi.map(|x| (x + pad) as f32)], each, mirror }
     }
 
-    /// Lanes whose rays, from `origin` in a direction of any length, may hit the box.
+    /// Those of the lanes whose rays, from `origin` in a direction (unit), may hit an object.
     #[inline(always)]
-    fn may_intersect<S: Simd>(&self, s: S, origin: V3<S>, direction: V3<S>) -> M<S> {
-        let [lo, hi] = &self.0;
+    fn may_intersect<S: Simd>(&self, s: S, origin: V3<S>, direction: V3<S>, lanes: M<S>) -> M<S> {
+        let lanes = lanes & self.may_intersect_box(s, origin, direction);
+        let mut found = lanes & !lanes;
+        for bounds in self.each.iter().filter(|bounds| bounds.instance != self.mirror) {
+            let wanted = lanes & !found;
+            if !wanted.any_true() {
+                break;
+            }
+            let to = V3::splat(s, bounds.center).sub(origin);
+            let (square, along) = (to.dot(to), to.dot(direction));
+            let radius = bounds.radius * bounds.radius;
+            // The differences lose digits, in proportion to the distance.
+            let near = (square - along * along).simd_le(square * 1e-6 + radius)
+                & (along.simd_ge(splat(s, 0.0)) | square.simd_le(splat(s, radius)));
+            if (wanted & near).any_true() {
+                let across = direction.cross(V3::splat(s, bounds.axis));
+                let distance = to.dot(across);
+                let limit = (square * 1e-9 + bounds.across * bounds.across) * across.dot(across);
+                found |= wanted & near & (distance * distance).simd_le(limit + square * 1e-12);
+            }
+        }
+        found
+    }
+
+    /// Lanes whose rays may hit the box.
+    #[inline(always)]
+    fn may_intersect_box<S: Simd>(&self, s: S, origin: V3<S>, direction: V3<S>) -> M<S> {
+        let [lo, hi] = &self.all;
         let (mut near, mut far) = (splat(s, 0.0), splat(s, f32::MAX));
         for (o, d, lo, hi) in [
             (origin.x, direction.x, lo[0], hi[0]),
@@ -111,6 +144,7 @@ struct SurfaceLanes {
     local: [[f32; LANES]; 3],
     uv: [[f32; LANES]; 2],
     uv_density: [f32; LANES],
+    shares: [[f32; LANES]; 3],
     distances: [f32; LANES],
 }
 
@@ -122,6 +156,7 @@ impl SurfaceLanes {
         local: [[0.0; LANES]; 3],
         uv: [[0.0; LANES]; 2],
         uv_density: [1.0; LANES],
+        shares: [[0.0; LANES]; 3],
         distances: [1.0; LANES],
     };
 
@@ -150,6 +185,9 @@ impl SurfaceLanes {
         }
         let (uv, density) = corner.and_then(|corner| corner.uv).unwrap_or(([0.0; 2], 1.0));
         (self.uv[0][k], self.uv[1][k], self.uv_density[k]) = (uv[0] as f32, uv[1] as f32, density as f32);
+        for (to, from) in self.shares.iter_mut().zip(corner.map_or([0.0; 3], |corner| corner.shares)) {
+            to[k] = from as f32;
+        }
         self.distances[k] = (reflected.distance + hit.distance) as f32;
     }
 
@@ -164,6 +202,7 @@ impl SurfaceLanes {
             local_position: v3(&self.local),
             uv: [load(s, &self.uv[0]), load(s, &self.uv[1])],
             uv_density: load(s, &self.uv_density),
+            shares: [load(s, &self.shares[0]), load(s, &self.shares[1]), load(s, &self.shares[2])],
         }
     }
 }
@@ -199,7 +238,7 @@ impl Mirrors<'_> {
                 let mirrored_view = view.sub(normal.scale(view.dot(normal) * 2.0));
                 let display = context.shade.scene.lighting_space == LightingSpace::Display;
                 let followed = match &self.bounds {
-                    Some(reach) => lanes & reach.may_intersect(s, point.position, mirrored_view),
+                    Some(reach) => reach.may_intersect(s, point.position, mirrored_view, lanes),
                     None => lanes,
                 };
                 let wanted = followed.to_bitmask();
@@ -301,13 +340,14 @@ impl Mirrors<'_> {
                 let here = at.surface(s, distance / length);
                 let [x, y, z] = &directions;
                 let direction = V3 { x: load(s, x), y: load(s, y), z: load(s, z) };
-                let corners = lit.lighting.polygons.is_in_use().then(|| {
-                    let triangles = hits.map(|hit| hit.map_or(0, |hit| hit.triangle));
-                    let mesh = source.instance.mesh();
-                    lit.lighting.polygons.corners(s, &source, mesh, &triangles, &here, mask(s, bits))
-                });
                 let mirrored = ViewRays { direction, distance };
-                let seen = shade(s, &lit, &source, &here, corners.as_ref(), mirrored, tint, mask(s, bits));
+                let here_lanes = mask(s, bits);
+                let corner_light = context.lit_polygons.map(|table| {
+                    let triangles = hits.map(|hit| hit.map_or(0, |hit| hit.triangle));
+                    let polygons = PolygonSource { index: instance, source: &source, mesh: source.instance.mesh() };
+                    light_at_corners(s, &lit, table, polygons, &triangles, &here, mirrored, false, tint, here_lanes)
+                });
+                let seen = shade(s, &lit, &source, &here, corner_light, mirrored, tint, here_lanes);
                 let seen = if display {
                     V3 { x: blend.to_bytes(s, seen.x), y: blend.to_bytes(s, seen.y), z: blend.to_bytes(s, seen.z) }
                 } else {
@@ -377,4 +417,65 @@ fn mask<S: Simd>(s: S, bits: u64) -> M<S> {
 #[inline(always)]
 fn add<S: Simd>(s: S, blend: BlendSpace, light: F<S>, byte: F<S>) -> F<S> {
     blend.color_of_bytes(min(max(blend.to_bytes(s, light) + byte, splat(s, 0.0)), splat(s, 255.0)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::assets::RayAssetCache;
+    use crate::raster::Layer;
+    use crate::simd::{all_levels, at_level};
+    use kinetoscope_testkit::scenes::{TestRng as SceneRng, random_scene};
+
+    /// Rays that hit an object are traced; most of those that miss all are not.
+    #[test]
+    fn bounds_of_reflections() {
+        let mut rng = crate::geometry::TestRng(5);
+        let (mut hits, mut misses, mut left_out) = (0, 0, 0);
+        for seed in 1..5 {
+            let (scene, poses) = random_scene(&mut SceneRng(seed), 1.0);
+            let mut tracer = RayTracer::default();
+            tracer.prepare_geometry(&scene, &RayAssetCache::default(), |_| Layer::Opaque);
+            tracer.place(&scene, &poses, None);
+            let all = [[-1e3; 3], [1e3; 3]];
+            let bounds = ReflectionBounds::new(all, tracer.round_bounds(), u32::MAX);
+            let bounded = |hit: &Hit| bounds.each.iter().any(|bounds| bounds.instance == hit.instance);
+            for _ in 0..200 {
+                let (mut origins, mut directions) = ([[0.0f32; LANES]; 3], [[0.0f32; LANES]; 3]);
+                for k in 0..LANES {
+                    let (origin, toward) = (rng.point(4.0), rng.point(1.0));
+                    let d = sub(toward, origin);
+                    let d = scale(d, 1.0 / dot(d, d).sqrt());
+                    for axis in 0..3 {
+                        (origins[axis][k], directions[axis][k]) = (origin[axis] as f32, d[axis] as f32);
+                    }
+                }
+                for level in all_levels() {
+                    let found = at_level!(level, s => {
+                        let v3 = |v: &[[f32; LANES]; 3]| V3 { x: load(s, &v[0]), y: load(s, &v[1]), z: load(s, &v[2]) };
+                        let every = splat(s, 0.0).simd_eq(splat(s, 0.0));
+                        bounds.may_intersect(s, v3(&origins), v3(&directions), every).to_bitmask()
+                    });
+                    for k in 0..LANES {
+                        let ray = Ray {
+                            origin: origins.map(|axis| f64::from(axis[k])),
+                            direction: directions.map(|axis| f64::from(axis[k])),
+                        };
+                        let mut stack = TraversalStack::default();
+                        let scalar = crate::simd::Scalar;
+                        let hit = tracer.closest_hit(scalar, &ray, f64::INFINITY, END_TIME, &mut stack);
+                        let is_followed = found >> k & 1 == 1;
+                        if hit.as_ref().is_some_and(bounded) {
+                            assert!(is_followed, "{ray:?} hits {hit:?}");
+                            hits += 1;
+                        } else {
+                            misses += 1;
+                            left_out += usize::from(!is_followed);
+                        }
+                    }
+                }
+            }
+        }
+        assert!(hits > 1000 && left_out * 4 > misses, "{hits} hits, {left_out} of {misses} misses are left out");
+    }
 }

@@ -3,12 +3,14 @@
 //! Color is computed in linear light; `tone` converts it for the screen.
 
 pub(crate) mod band;
+pub(crate) mod corner_light;
 pub(crate) mod group;
 pub(crate) mod horizon;
 pub(crate) mod light;
 pub(crate) mod mirror;
 pub(crate) mod motion_vectors;
 pub(crate) mod multisample;
+mod polygon_cells;
 pub(crate) mod polygons;
 pub(crate) mod prepared_frame;
 pub(crate) mod shadow;

@@ -69,6 +69,9 @@ impl EdgeSamples {
         corner: [f32; 2],
         colors: &mut [Colors],
     ) {
+        if tile.is_uniform(block) {
+            return;
+        }
         let at = |plane: usize| tile.samples(block, plane) + row * LANES;
         let center = load_u(s, &tile.id[at(0)..]);
         let mut same = center.simd_eq(load_u(s, &tile.id[at(1)..]));

@@ -3,22 +3,20 @@
 //! Visibility and depth stay those of the shapes. Only light is computed at the corners and interpolated.
 
 use super::light::cos_deg;
+use super::polygon_cells::{Cells, CornerLanes, LineLanes, PolygonLanes, Quad, pick};
 use super::surface::{InstanceSurface, Surface};
 use super::texture::floor_lanes;
 use crate::simd::{F, LANES, M, Simd, V3, abs, load, max, min, select, splat};
 use kinetoscope_scene::shape::{RenderMesh, Shape};
 use kinetoscope_scene::{PlaneLines, Tessellation};
 
-/// Corners of the polygons, triangles, at sixteen points of a surface.
-#[derive(Clone, Copy)]
-pub(crate) struct CornerLanes<S: Simd> {
-    /// Positions in the world \[m\].
-    pub(crate) positions: [V3<S>; 3],
-    /// Unit normals, world frame; outward, whatever side is visible.
-    pub(crate) normals: [V3<S>; 3],
-    /// Barycentric coordinates of the points.
-    pub(crate) shares: [F<S>; 3],
-}
+/// Parts of round shapes: the upper and the lower end of a capsule, or the whole of a ball, the side of a cylinder, and its
+/// flat ends.
+const UPPER: f32 = 0.0;
+const LOWER: f32 = 1.0;
+const SIDE: f32 = 2.0;
+const TOP: f32 = 3.0;
+const BOTTOM: f32 = 4.0;
 
 /// Corners of the polygons of all shapes of a frame.
 #[derive(Clone, Debug, Default)]
@@ -62,62 +60,77 @@ impl PolygonTables {
         self.tessellation.is_some()
     }
 
-    /// Corners of the polygons at the selected points of an instance; `triangle` has the index of the triangle of its
-    /// `mesh` in each lane.
+    /// Polygons at the selected points of an instance; `triangle` has the index of the triangle of its `mesh` in each
+    /// lane. Other lanes have the polygon of a selected one.
     #[inline(always)]
-    pub(crate) fn corners<S: Simd>(
+    pub(crate) fn polygons<S: Simd>(
         &self,
         s: S,
         source: &InstanceSurface<'_>,
         mesh: Option<&RenderMesh>,
         triangle: &[u32; LANES],
         at: &Surface<S>,
-        lanes: M<S>,
-    ) -> CornerLanes<S> {
-        match mesh {
-            Some(mesh) => of_mesh(s, source, mesh, triangle, at.local_position, lanes.to_bitmask()),
+        lanes: u64,
+    ) -> PolygonLanes<S> {
+        let mut found = match mesh {
+            Some(_) => PolygonLanes { numbers: *triangle, shares: at.shares },
             None => self.of_instance(s, source, at),
+        };
+        let fill = found.numbers[(lanes.trailing_zeros() as usize).min(LANES - 1)];
+        for (k, number) in found.numbers.iter_mut().enumerate() {
+            *number = if lanes >> k & 1 == 1 { *number } else { fill };
         }
+        found
     }
 
-    /// Corners at points of an instance that is a shape with a closed form. One copy per instruction set.
+    /// Corners of polygons of an instance, in the world.
+    #[inline(always)]
+    pub(crate) fn corners<S: Simd>(
+        &self,
+        s: S,
+        source: &InstanceSurface<'_>,
+        mesh: Option<&RenderMesh>,
+        numbers: &[u32; LANES],
+    ) -> CornerLanes<S> {
+        let corners = match mesh {
+            Some(mesh) => of_mesh(s, mesh, numbers),
+            None => self.of_shape(s, &source.instance.shape, source.plane_lines, numbers),
+        };
+        corners.into_world(s, source)
+    }
+
+    /// Polygons at points of an instance that is a shape with a closed form. One copy per instruction set.
     #[inline(never)]
-    fn of_instance<S: Simd>(&self, s: S, source: &InstanceSurface<'_>, at: &Surface<S>) -> CornerLanes<S> {
+    fn of_instance<S: Simd>(&self, s: S, source: &InstanceSurface<'_>, at: &Surface<S>) -> PolygonLanes<S> {
         s.vectorize(
             #[inline(always)]
             || {
                 let rotation = &source.world_from_instance.rotation;
                 let into_local = [0, 1, 2].map(|j| [0, 1, 2].map(|i| rotation[i][j]));
                 let normal = at.normal.rotate(&into_local);
-                let corners = self.of_shape(s, &source.instance.shape, source.plane_lines, at.local_position, normal);
-                corners.into_world(s, source)
+                self.at_points(s, &source.instance.shape, source.plane_lines, at.local_position, normal)
             },
         )
     }
 
-    /// Triangles at points of a shape with a closed form, where it has these outward normals (or their opposites), in the
+    /// Polygons at points of a shape with a closed form, where it has these outward normals (or their opposites), in the
     /// frame of the shape.
     #[inline(always)]
-    fn of_shape<S: Simd>(
+    fn at_points<S: Simd>(
         &self,
         s: S,
         shape: &Shape,
         lines: [PlaneLines; 2],
         p: V3<S>,
         normal: V3<S>,
-    ) -> CornerLanes<S> {
-        let quality = self.tessellation.unwrap_or_default();
+    ) -> PolygonLanes<S> {
         let (zero, one) = (splat(s, 0.0), splat(s, 1.0));
-        let minus = splat(s, -1.0);
+        let everything = one.simd_eq(one);
         match shape {
             Shape::Plane(_) => {
-                let (x, u) = LineLanes::of(s, lines[0]).cell(s, p.x);
-                let (y, v) = LineLanes::of(s, lines[1]).cell(s, p.y);
-                let up = V3 { x: zero, y: zero, z: one };
-                Quad::new(s, [u, v], one.simd_eq(one)).corners(
-                    #[inline(always)]
-                    |right, upper| (V3 { x: pick(right, x), y: pick(upper, y), z: zero }, up),
-                )
+                let (column, u) = LineLanes::of(s, lines[0]).cell(s, p.x);
+                let (row, v) = LineLanes::of(s, lines[1]).cell(s, p.y);
+                Quad::at(s, [u, v], everything).polygons(s, [column, row], zero)
             }
             Shape::Box(cuboid) => {
                 let (nx, ny, nz) = (abs(normal.x), abs(normal.y), abs(normal.z));
@@ -126,90 +139,192 @@ impl PolygonTables {
                 let by_y = !by_x & !by_z;
                 // The visible side tells the face, also from inside.
                 let on_axis = select(by_x, p.x, select(by_y, p.y, p.z));
-                let side = select(on_axis.simd_lt(zero), minus, one);
-                let half = cuboid.half.map(|half| splat(s, half));
-                let count = f32::from(quality.quads.clamp(1, MAX_POLYGONS));
-                let lines = {
-                    #[inline(always)]
-                    |half: F<S>| LineLanes { reach: half, step: half * 2.0 / count, border: half }
-                };
-                let (x, u) = lines(select(by_x, half[1], half[0])).cell(s, select(by_x, p.y, p.x));
-                let (y, v) = lines(select(by_z, half[1], half[2])).cell(s, select(by_z, p.y, p.z));
-                let is_outer = side.simd_gt(zero);
+                let is_outer = !on_axis.simd_lt(zero);
+                let lines = self.box_lines(s, cuboid.half, by_x, by_z);
+                let (column, u) = lines[0].cell(s, select(by_x, p.y, p.x));
+                let (row, v) = lines[1].cell(s, select(by_z, p.y, p.z));
                 let is_anti = (is_outer & !by_y) | (!is_outer & by_y);
-                let [half_x, half_y, half_z] = half;
-                let normal =
-                    V3 { x: select(by_x, side, zero), y: select(by_y, side, zero), z: select(by_z, side, zero) };
-                Quad::new(s, [u, v], is_anti).corners(
-                    #[inline(always)]
-                    |right, upper| {
-                        let (right, upper) = (pick(right, x), pick(upper, y));
-                        let position = V3 {
-                            x: select(by_x, side * half_x, right),
-                            y: select(by_y, side * half_y, select(by_x, right, upper)),
-                            z: select(by_z, side * half_z, upper),
-                        };
-                        (position, normal)
-                    },
-                )
+                let axis = select(by_x, zero, select(by_y, splat(s, 2.0), splat(s, 4.0)));
+                let face = axis + select(is_outer, one, zero);
+                Quad::at(s, [u, v], is_anti).polygons(s, [column, row], face)
             }
-            Shape::Sphere(sphere) => self.of_ball(s, [sphere.radius; 3], p, zero),
-            Shape::Ellipsoid(ellipsoid) => self.of_ball(s, ellipsoid.radii, p, zero),
+            Shape::Sphere(sphere) => self.on_ball(s, [sphere.radius; 3], p, zero, splat(s, UPPER)),
+            Shape::Ellipsoid(ellipsoid) => self.on_ball(s, ellipsoid.radii, p, zero, splat(s, UPPER)),
             Shape::Capsule(capsule) => {
                 let (radius, half) = (capsule.radius, capsule.half_length);
                 let is_end = abs(p.z).simd_gt(splat(s, half));
-                let center = select(p.z.simd_lt(zero), splat(s, -half), splat(s, half));
+                let is_low = p.z.simd_lt(zero);
+                let center = select(is_low, splat(s, -half), splat(s, half));
+                let part = select(is_low, splat(s, LOWER), splat(s, UPPER));
                 if is_end.all_true() {
-                    return self.of_ball(s, [radius; 3], p, center);
+                    return self.on_ball(s, [radius; 3], p, center, part);
                 }
-                let tube = self.of_tube(s, radius, half, quality.stacks, p);
+                let tube = self.on_tube(s, half, p);
                 if !is_end.any_true() {
                     return tube;
                 }
-                CornerLanes::select(is_end, self.of_ball(s, [radius; 3], p, center), tube)
+                PolygonLanes::select(s, is_end, self.on_ball(s, [radius; 3], p, center, part), tube)
             }
             Shape::Cylinder(cylinder) => {
-                let (radius, half) = (cylinder.radius, cylinder.half_length);
                 let is_side = abs(normal.z).simd_lt(splat(s, 0.5));
-                let tube = self.of_tube(s, radius, half, quality.stacks, p);
+                let tube = self.on_tube(s, cylinder.half_length, p);
                 if is_side.all_true() {
                     return tube;
                 }
-                let side = select(p.z.simd_lt(zero), minus, one);
-                let count = f32::from((quality.stacks / 2).clamp(1, MAX_POLYGONS));
-                let rings = PlaneLines { reach: radius, step: radius / count, border: radius };
-                let (ring, t) = LineLanes::of(s, rings).cell(s, (p.x * p.x + p.y * p.y).sqrt());
-                let (cosines, sines, u) = self.slice(s, p.x, p.y);
-                let normal = V3 { x: zero, y: zero, z: side };
-                let cap = Quad::new(s, [u, t], side.simd_lt(zero)).corners(
-                    #[inline(always)]
-                    |right, upper| {
-                        let r = max(pick(upper, ring), zero);
-                        (V3 { x: r * pick(right, cosines), y: r * pick(right, sines), z: side * half }, normal)
-                    },
-                );
-                CornerLanes::select(is_side, tube, cap)
+                let is_low = p.z.simd_lt(zero);
+                let rings = self.rings(s, cylinder.radius);
+                let (row, t) = rings.cell(s, (p.x * p.x + p.y * p.y).sqrt());
+                let (column, u) = self.slice(s, p.x, p.y);
+                let part = select(is_low, splat(s, BOTTOM), splat(s, TOP));
+                let cap = Quad::at(s, [u, t], is_low).polygons(s, [column, row], part);
+                PolygonLanes::select(s, is_side, tube, cap)
             }
-            _ => CornerLanes { positions: [p; 3], normals: [normal; 3], shares: [one, zero, zero] },
+            _ => PolygonLanes { numbers: [0; LANES], shares: [one, zero, zero] },
         }
     }
 
-    /// Slices of a round shape at points: cosines and sines of their two ends, and the fractions between them.
-    #[inline(always)]
-    fn slice<S: Simd>(&self, s: S, x: F<S>, y: F<S>) -> ([F<S>; 2], [F<S>; 2], F<S>) {
-        let turns = angle(s, y, x) * (1.0 / 360.0);
-        let turns = select(turns.simd_lt(splat(s, 0.0)), turns + 1.0, turns);
-        ends_of(s, &self.angles, turns)
+    /// Corners of polygons of a shape with a closed form, in the frame of the shape.
+    #[inline(never)]
+    fn of_shape<S: Simd>(&self, s: S, shape: &Shape, lines: [PlaneLines; 2], numbers: &[u32; LANES]) -> CornerLanes<S> {
+        s.vectorize(
+            #[inline(always)]
+            || {
+                let cells = Cells::of(s, numbers);
+                let (zero, one) = (splat(s, 0.0), splat(s, 1.0));
+                let minus = splat(s, -1.0);
+                let everything = one.simd_eq(one);
+                match shape {
+                    Shape::Plane(_) => {
+                        let x = LineLanes::of(s, lines[0]).ends(s, cells.column);
+                        let y = LineLanes::of(s, lines[1]).ends(s, cells.row);
+                        let up = V3 { x: zero, y: zero, z: one };
+                        Quad::of(cells.half, everything).corners(
+                            #[inline(always)]
+                            |right, upper| (V3 { x: pick(right, x), y: pick(upper, y), z: zero }, up),
+                        )
+                    }
+                    Shape::Box(cuboid) => {
+                        let by_x = cells.part.simd_lt(splat(s, 2.0));
+                        let by_z = cells.part.simd_ge(splat(s, 4.0));
+                        let by_y = !by_x & !by_z;
+                        let axis = select(by_x, zero, select(by_y, splat(s, 2.0), splat(s, 4.0)));
+                        let is_outer = cells.part.simd_gt(axis);
+                        let side = select(is_outer, one, minus);
+                        let lines = self.box_lines(s, cuboid.half, by_x, by_z);
+                        let (x, y) = (lines[0].ends(s, cells.column), lines[1].ends(s, cells.row));
+                        let is_anti = (is_outer & !by_y) | (!is_outer & by_y);
+                        let [half_x, half_y, half_z] = cuboid.half.map(|half| splat(s, half));
+                        let normal = V3 {
+                            x: select(by_x, side, zero),
+                            y: select(by_y, side, zero),
+                            z: select(by_z, side, zero),
+                        };
+                        Quad::of(cells.half, is_anti).corners(
+                            #[inline(always)]
+                            |right, upper| {
+                                let (right, upper) = (pick(right, x), pick(upper, y));
+                                let position = V3 {
+                                    x: select(by_x, side * half_x, right),
+                                    y: select(by_y, side * half_y, select(by_x, right, upper)),
+                                    z: select(by_z, side * half_z, upper),
+                                };
+                                (position, normal)
+                            },
+                        )
+                    }
+                    Shape::Sphere(sphere) => self.of_ball(s, [sphere.radius; 3], zero, cells),
+                    Shape::Ellipsoid(ellipsoid) => self.of_ball(s, ellipsoid.radii, zero, cells),
+                    Shape::Capsule(capsule) => {
+                        let (radius, half) = (capsule.radius, capsule.half_length);
+                        let is_low = cells.part.simd_eq(splat(s, LOWER));
+                        let center = select(is_low, splat(s, -half), splat(s, half));
+                        let is_side = cells.part.simd_eq(splat(s, SIDE));
+                        let ball = self.of_ball(s, [radius; 3], center, cells);
+                        if !is_side.any_true() {
+                            return ball;
+                        }
+                        CornerLanes::select(is_side, self.of_tube(s, radius, half, cells), ball)
+                    }
+                    Shape::Cylinder(cylinder) => {
+                        let (radius, half) = (cylinder.radius, cylinder.half_length);
+                        let tube = self.of_tube(s, radius, half, cells);
+                        let is_side = cells.part.simd_eq(splat(s, SIDE));
+                        if is_side.all_true() {
+                            return tube;
+                        }
+                        let is_low = cells.part.simd_eq(splat(s, BOTTOM));
+                        let side = select(is_low, minus, one);
+                        let ring = self.rings(s, radius).ends(s, cells.row);
+                        let (cosines, sines) = ends_of(s, &self.angles, cells.column);
+                        let normal = V3 { x: zero, y: zero, z: side };
+                        let cap = Quad::of(cells.half, is_low).corners(
+                            #[inline(always)]
+                            |right, upper| {
+                                let r = max(pick(upper, ring), zero);
+                                (V3 { x: r * pick(right, cosines), y: r * pick(right, sines), z: side * half }, normal)
+                            },
+                        );
+                        CornerLanes::select(is_side, tube, cap)
+                    }
+                    _ => {
+                        let nothing = V3 { x: zero, y: zero, z: zero };
+                        CornerLanes { positions: [nothing; 3], normals: [nothing; 3] }
+                    }
+                }
+            },
+        )
     }
 
-    /// Triangles of a ball with the centers (0, 0, `center`).
+    /// Lines of the faces of a box, across and along.
     #[inline(always)]
-    fn of_ball<S: Simd>(&self, s: S, radii: [f32; 3], p: V3<S>, center: F<S>) -> CornerLanes<S> {
+    fn box_lines<S: Simd>(&self, s: S, half: [f32; 3], by_x: M<S>, by_z: M<S>) -> [LineLanes<S>; 2] {
+        let quality = self.tessellation.unwrap_or_default();
+        let half = half.map(|half| splat(s, half));
+        let count = f32::from(quality.quads.clamp(1, MAX_POLYGONS));
+        let lines = {
+            #[inline(always)]
+            |half: F<S>| LineLanes { reach: half, step: half * 2.0 / count, border: half }
+        };
+        [lines(select(by_x, half[1], half[0])), lines(select(by_z, half[1], half[2]))]
+    }
+
+    /// Rings of the flat ends of a cylinder.
+    #[inline(always)]
+    fn rings<S: Simd>(&self, s: S, radius: f32) -> LineLanes<S> {
+        let count = f32::from((self.tessellation.unwrap_or_default().stacks / 2).clamp(1, MAX_POLYGONS));
+        LineLanes::of(s, PlaneLines { reach: radius, step: radius / count, border: radius })
+    }
+
+    /// Lines around the side of a cylinder.
+    #[inline(always)]
+    fn tube_lines<S: Simd>(&self, s: S, half: f32) -> LineLanes<S> {
+        let count = f32::from(self.tessellation.unwrap_or_default().stacks.clamp(1, MAX_POLYGONS));
+        LineLanes::of(s, PlaneLines { reach: half, step: 2.0 * half / count, border: half })
+    }
+
+    /// Slices of a round shape at points, and the fractions between their two ends.
+    #[inline(always)]
+    fn slice<S: Simd>(&self, s: S, x: F<S>, y: F<S>) -> (F<S>, F<S>) {
+        let turns = angle(s, y, x) * (1.0 / 360.0);
+        let turns = select(turns.simd_lt(splat(s, 0.0)), turns + 1.0, turns);
+        entry_of(s, &self.angles, turns)
+    }
+
+    /// Polygons of a ball with the centers (0, 0, `center`).
+    #[inline(always)]
+    fn on_ball<S: Simd>(&self, s: S, radii: [f32; 3], p: V3<S>, center: F<S>, part: F<S>) -> PolygonLanes<S> {
         let q = V3 { x: p.x / radii[0], y: p.y / radii[1], z: (p.z - center) / radii[2] };
-        let (cosines, sines, u) = self.slice(s, q.x, q.y);
+        let (column, u) = self.slice(s, q.x, q.y);
         let latitude = angle(s, q.z, (q.x * q.x + q.y * q.y).sqrt()) * (1.0 / 180.0) + 0.5;
-        let (flats, ups, v) = ends_of(s, &self.latitudes, latitude);
-        Quad::new(s, [u, v], center.simd_eq(center)).corners(
+        let (row, v) = entry_of(s, &self.latitudes, latitude);
+        Quad::at(s, [u, v], center.simd_eq(center)).polygons(s, [column, row], part)
+    }
+
+    #[inline(always)]
+    fn of_ball<S: Simd>(&self, s: S, radii: [f32; 3], center: F<S>, cells: Cells<S>) -> CornerLanes<S> {
+        let (cosines, sines) = ends_of(s, &self.angles, cells.column);
+        let (flats, ups) = ends_of(s, &self.latitudes, cells.row);
+        Quad::of(cells.half, center.simd_eq(center)).corners(
             #[inline(always)]
             |right, upper| {
                 let (flat, up) = (pick(upper, flats), pick(upper, ups));
@@ -221,15 +336,21 @@ impl PolygonTables {
         )
     }
 
-    /// Triangles of the side of a cylinder.
+    /// Polygons of the side of a cylinder.
     #[inline(always)]
-    fn of_tube<S: Simd>(&self, s: S, radius: f32, half: f32, stacks: u16, p: V3<S>) -> CornerLanes<S> {
+    fn on_tube<S: Simd>(&self, s: S, half: f32, p: V3<S>) -> PolygonLanes<S> {
         let zero = splat(s, 0.0);
-        let (cosines, sines, u) = self.slice(s, p.x, p.y);
-        let count = f32::from(stacks.clamp(1, MAX_POLYGONS));
-        let lines = PlaneLines { reach: half, step: 2.0 * half / count, border: half };
-        let (heights, v) = LineLanes::of(s, lines).cell(s, p.z);
-        Quad::new(s, [u, v], zero.simd_eq(zero)).corners(
+        let (column, u) = self.slice(s, p.x, p.y);
+        let (row, v) = self.tube_lines(s, half).cell(s, p.z);
+        Quad::at(s, [u, v], zero.simd_eq(zero)).polygons(s, [column, row], splat(s, SIDE))
+    }
+
+    #[inline(always)]
+    fn of_tube<S: Simd>(&self, s: S, radius: f32, half: f32, cells: Cells<S>) -> CornerLanes<S> {
+        let zero = splat(s, 0.0);
+        let (cosines, sines) = ends_of(s, &self.angles, cells.column);
+        let heights = self.tube_lines(s, half).ends(s, cells.row);
+        Quad::of(cells.half, zero.simd_eq(zero)).corners(
             #[inline(always)]
             |right, upper| {
                 let (x, y) = (pick(right, cosines), pick(right, sines));
@@ -239,159 +360,42 @@ impl PolygonTables {
     }
 }
 
-impl<S: Simd> CornerLanes<S> {
-    /// The same corners in the world.
-    #[inline(always)]
-    fn into_world(self, s: S, source: &InstanceSurface<'_>) -> Self {
-        let world = source.world_from_instance;
-        let from = V3::splat(s, world.translation);
-        let ([a, b, c], [l, m, n]) = (self.positions, self.normals);
-        let positions = [
-            a.rotate(&world.rotation).add(from),
-            b.rotate(&world.rotation).add(from),
-            c.rotate(&world.rotation).add(from),
-        ];
-        Self {
-            positions,
-            normals: [l.rotate(&world.rotation), m.rotate(&world.rotation), n.rotate(&world.rotation)],
-            ..self
-        }
-    }
-
-    /// `a` where the mask is set, else `b`.
-    #[inline(always)]
-    fn select(m: M<S>, a: Self, b: Self) -> Self {
-        let v3 = {
-            #[inline(always)]
-            |a: [V3<S>; 3], b: [V3<S>; 3]| {
-                [V3::select(m, a[0], b[0]), V3::select(m, a[1], b[1]), V3::select(m, a[2], b[2])]
-            }
-        };
-        let (p, q) = (a.shares, b.shares);
-        Self {
-            positions: v3(a.positions, b.positions),
-            normals: v3(a.normals, b.normals),
-            shares: [select(m, p[0], q[0]), select(m, p[1], q[1]), select(m, p[2], q[2])],
-        }
-    }
-}
-
-/// The second of two ends where the mask is set, else the first.
+/// Entries of a table at fractions of its length, and the fractions between them and the next ones.
 #[inline(always)]
-fn pick<S: Simd>(second: M<S>, [a, b]: [F<S>; 2]) -> F<S> {
-    select(second, b, a)
-}
-
-/// [`PlaneLines`] of sixteen points.
-#[derive(Clone, Copy)]
-struct LineLanes<S: Simd> {
-    reach: F<S>,
-    step: F<S>,
-    border: F<S>,
-}
-
-impl<S: Simd> LineLanes<S> {
-    #[inline(always)]
-    fn of(s: S, lines: PlaneLines) -> Self {
-        Self { reach: splat(s, lines.reach), step: splat(s, lines.step), border: splat(s, lines.border) }
-    }
-
-    /// [`PlaneLines::cell`]: the two lines around coordinates, and the fractions of the way between them.
-    #[inline(always)]
-    fn cell(self, s: S, x: F<S>) -> ([F<S>; 2], F<S>) {
-        let Self { reach, step, border } = self;
-        let (zero, one) = (splat(s, 0.0), splat(s, 1.0));
-        let line = floor_lanes(s, (x + reach) / step);
-        let (before, behind) = (x.simd_lt(-reach), x.simd_ge(reach));
-        let low = select(before, -border, select(behind, reach, line * step - reach));
-        let high = select(before, -reach, select(behind, border, (line + 1.0) * step - reach));
-        let width = high - low;
-        let is_wide = width.simd_gt(zero);
-        let fraction = (x - low) / select(is_wide, width, one);
-        ([low, high], select(is_wide, min(max(fraction, zero), one), zero))
-    }
-}
-
-/// Triangles of quadrilaterals at fractions of their width and height. OpenGL splits some from the lower right to the
-/// upper left corner, others from the lower left to the upper right one.
-#[derive(Clone, Copy)]
-struct Quad<S: Simd> {
-    /// Masks of the corners that are right, and upper.
-    right: [M<S>; 3],
-    upper: [M<S>; 3],
-    shares: [F<S>; 3],
-}
-
-impl<S: Simd> Quad<S> {
-    /// `is_anti` is set for those that are split from the lower right to the upper left corner.
-    #[inline(always)]
-    fn new(s: S, [u, v]: [F<S>; 2], is_anti: M<S>) -> Self {
-        let one = splat(s, 1.0);
-        let (nothing, everything) = (one.simd_lt(one), one.simd_eq(one));
-        let (is_upper, is_right) = ((u + v).simd_gt(one), u.simd_gt(v));
-        let anti =
-            [select(is_upper, one - v, u), select(is_upper, one - u, v), select(is_upper, u + v - 1.0, one - u - v)];
-        let other = [select(is_right, one - u, one - v), select(is_right, v, u), select(is_right, u - v, v - u)];
-        Self {
-            right: [is_anti, !is_anti, (is_anti & is_upper) | (!is_anti & is_right)],
-            upper: [nothing, everything, (is_anti & is_upper) | !(is_anti | is_right)],
-            shares: [
-                select(is_anti, anti[0], other[0]),
-                select(is_anti, anti[1], other[1]),
-                select(is_anti, anti[2], other[2]),
-            ],
-        }
-    }
-
-    /// The corners; `corner` has the position and the normal of a corner: right or not, upper or not.
-    #[inline(always)]
-    fn corners(self, corner: impl Fn(M<S>, M<S>) -> (V3<S>, V3<S>)) -> CornerLanes<S> {
-        let Self { right, upper, shares } = self;
-        let ends = [corner(right[0], upper[0]), corner(right[1], upper[1]), corner(right[2], upper[2])];
-        let [(a, l), (b, m), (c, n)] = ends;
-        CornerLanes { positions: [a, b, c], normals: [l, m, n], shares }
-    }
-}
-
-/// Both numbers of the entries of a table around fractions of its length, and the fractions between them.
-#[inline(always)]
-fn ends_of<S: Simd>(s: S, table: &[[f32; 2]], fraction: F<S>) -> ([F<S>; 2], [F<S>; 2], F<S>) {
+fn entry_of<S: Simd>(s: S, table: &[[f32; 2]], fraction: F<S>) -> (F<S>, F<S>) {
     let count = table.len().saturating_sub(1).max(1) as f32;
     let (zero, one) = (splat(s, 0.0), splat(s, 1.0));
     let at = fraction * count;
     // Also for lanes of other instances, whose numbers may be anything.
     let index = max(min(floor_lanes(s, at), splat(s, count - 1.0)), zero);
-    let indices: [i32; LANES] = index.to_int().array();
+    (index, min(max(at - index, zero), one))
+}
+
+/// Both numbers of the entries of a table, and of the next ones.
+#[inline(always)]
+fn ends_of<S: Simd>(s: S, table: &[[f32; 2]], entry: F<S>) -> ([F<S>; 2], [F<S>; 2]) {
+    let entries: [i32; LANES] = entry.to_int().array();
     let mut ends = [[[0.0f32; LANES]; 2]; 2];
-    for (k, &index) in indices.iter().enumerate() {
-        for (end, entry) in table.iter().skip(index as usize).take(2).enumerate() {
+    for (k, &entry) in entries.iter().enumerate() {
+        for (end, entry) in table.iter().skip(entry as usize).take(2).enumerate() {
             (ends[0][end][k], ends[1][end][k]) = (entry[0], entry[1]);
         }
     }
     let [[a, b], [c, d]] = &ends;
-    ([load(s, a), load(s, b)], [load(s, c), load(s, d)], min(max(at - index, zero), one))
+    ([load(s, a), load(s, b)], [load(s, c), load(s, d)])
 }
 
-/// Triangles of a mesh at points of it, in the world. Lanes that are not in `lanes` copy one that is.
+/// Corners of triangles of a mesh, in its frame.
 #[inline(never)]
-fn of_mesh<S: Simd>(
-    s: S,
-    source: &InstanceSurface<'_>,
-    mesh: &RenderMesh,
-    triangle: &[u32; LANES],
-    point: V3<S>,
-    lanes: u64,
-) -> CornerLanes<S> {
+fn of_mesh<S: Simd>(s: S, mesh: &RenderMesh, triangles: &[u32; LANES]) -> CornerLanes<S> {
     s.vectorize(
         #[inline(always)]
         || {
             let zero = [[0.0f32; LANES]; 3];
             let (mut p, mut n) = ([zero; 3], [zero; 3]);
-            let fill = (lanes.trailing_zeros() as usize).min(LANES - 1);
             let (positions, normals) = (mesh.positions(), mesh.normals());
-            for k in 0..LANES {
-                let from = if lanes >> k & 1 == 1 { k } else { fill };
-                let corners = mesh.triangles()[triangle[from] as usize];
+            for (k, &triangle) in triangles.iter().enumerate() {
+                let corners = mesh.triangles()[triangle as usize];
                 for (c, &corner) in corners.iter().enumerate() {
                     let (position, normal) = (positions[corner as usize], normals[corner as usize]);
                     for axis in 0..3 {
@@ -403,21 +407,7 @@ fn of_mesh<S: Simd>(
                 #[inline(always)]
                 |a: &[[f32; LANES]; 3]| V3 { x: load(s, &a[0]), y: load(s, &a[1]), z: load(s, &a[2]) }
             };
-            let [a, b, c] = [v3(&p[0]), v3(&p[1]), v3(&p[2])];
-            let (ab, ac, w) = (b.sub(a), c.sub(a), point.sub(a));
-            let normal = ab.cross(ac);
-            let area = normal.dot(normal);
-            let (zero, one) = (splat(s, 0.0), splat(s, 1.0));
-            let has_area = area.simd_gt(zero);
-            let inverse = select(has_area, 1.0 / select(has_area, area, one), zero);
-            let kb = min(max(w.cross(ac).dot(normal) * inverse, zero), one);
-            let kc = min(max(ab.cross(w).dot(normal) * inverse, zero), one - kb);
-            let corners = CornerLanes {
-                positions: [a, b, c],
-                normals: [v3(&n[0]), v3(&n[1]), v3(&n[2])],
-                shares: [one - kb - kc, kb, kc],
-            };
-            corners.into_world(s, source)
+            CornerLanes { positions: [v3(&p[0]), v3(&p[1]), v3(&p[2])], normals: [v3(&n[0]), v3(&n[1]), v3(&n[2])] }
         },
     )
 }
@@ -481,9 +471,8 @@ mod tests {
     }
 
     impl Corners {
-        fn of<S: Simd>(lanes: &CornerLanes<S>, k: usize) -> Self {
+        fn of<S: Simd>(lanes: &CornerLanes<S>, [a, b, c]: &[F<S>; 3], k: usize) -> Self {
             let at = |v: &V3<S>| [v.x.array()[k], v.y.array()[k], v.z.array()[k]];
-            let [a, b, c] = &lanes.shares;
             Self {
                 positions: lanes.positions.each_ref().map(at),
                 normals: lanes.normals.each_ref().map(at),
@@ -530,8 +519,9 @@ mod tests {
                             y: load(s, &lanes(which, 1)),
                             z: load(s, &lanes(which, 2)),
                         };
-                        let found = tables.of_shape(s, shape, lines, v3(0), v3(1));
-                        (0..LANES).map(|k| Corners::of(&found, k)).collect()
+                        let found = tables.at_points(s, shape, lines, v3(0), v3(1));
+                        let corners = tables.of_shape(s, shape, lines, &found.numbers);
+                        (0..LANES).map(|k| Corners::of(&corners, &found.shares, k)).collect()
                     });
                     for ([point, normal], found) in sixteen.iter().zip(&found) {
                         let mean =
@@ -553,53 +543,6 @@ mod tests {
                 }
                 assert!(seen.len() > 30, "{}: {}", shape.name(), seen.len());
             }
-        }
-    }
-
-    /// The lines around coordinates are those of [`PlaneLines::cell`].
-    #[test]
-    fn cells() {
-        let lines = PlaneLines { reach: 1.0, step: 0.5, border: 1.25 };
-        for first in (-140..140).step_by(LANES) {
-            let x: [f32; LANES] = std::array::from_fn(|k| 0.01 * (first + k as i32) as f32);
-            for level in all_levels() {
-                at_level!(level, s => {
-                    let ([low, high], fraction) = LineLanes::of(s, lines).cell(s, load(s, &x));
-                    let found = [low, high, fraction].map(|lanes| lanes.array());
-                    for (k, &x) in x.iter().enumerate() {
-                        let (ends, fraction) = lines.cell(x);
-                        assert_eq!(found.map(|lanes| lanes[k]), [ends[0], ends[1], fraction], "{x}");
-                    }
-                });
-            }
-        }
-    }
-
-    /// Interpolation is continuous across both diagonals of a quadrilateral, and exact at its corners.
-    #[test]
-    fn diagonals() {
-        for level in all_levels() {
-            let value = |u: f32, v: f32, anti: bool| {
-                at_level!(level, s => {
-                    let (zero, one) = (splat(s, 0.0), splat(s, 1.0));
-                    let is_anti = if anti { one.simd_eq(one) } else { one.simd_eq(zero) };
-                    let found = Quad::new(s, [splat(s, u), splat(s, v)], is_anti).corners(|right, upper| {
-                        let at = V3 { x: pick(right, [zero, one]), y: pick(upper, [zero, splat(s, 3.0)]), z: zero };
-                        (at, at)
-                    });
-                    let Corners { positions, shares, .. } = Corners::of(&found, 5);
-                    (0..3).map(|c| shares[c] * (positions[c][0] * positions[c][1])).sum::<f32>()
-                })
-            };
-            for anti in [false, true] {
-                assert_eq!(
-                    [value(0., 0., anti), value(1., 0., anti), value(0., 1., anti), value(1., 1., anti)],
-                    [0., 0., 0., 3.]
-                );
-            }
-            // In the middle: on the diagonal between the corners with 0, or with 0 and 3.
-            assert_eq!([value(0.5, 0.5, true), value(0.5, 0.5, false)], [0.0, 1.5]);
-            assert!((value(0.501, 0.5, true) - value(0.499, 0.5, true)).abs() < 0.01);
         }
     }
 }

@@ -1,6 +1,7 @@
 //! State that all bands of a frame share: draw list, lights and shadows.
 
 use super::MAX_BAND_SAMPLES;
+use super::corner_light::LitPolygons;
 use super::group::ShadingContext;
 use super::horizon::Horizon;
 use super::light::{Lighting, MAX_LIGHTS, PixelWidth, ShadeContext};
@@ -267,6 +268,7 @@ impl PreparedFrame {
         render_request: &RenderRequest<'a>,
         projection: &'a Projection,
         stack: &'a RefCell<&'a mut TraversalStack>,
+        lit_polygons: &'a RefCell<&'a mut LitPolygons>,
         [surface, albedo, flow]: [bool; 3],
     ) -> ShadingContext<'a> {
         let (shadows, occlusion_rays) = (self.shadow_rays, self.occlusion_rays);
@@ -280,7 +282,7 @@ impl PreparedFrame {
             let bounds = (only_first || !others)
                 .then(|| tracer.bounds_without(first as u32))
                 .flatten()
-                .map(ReflectionBounds::new);
+                .map(|all| ReflectionBounds::new(all, tracer.round_bounds(), first as u32));
             Mirrors { tracer, stack, first, only_first, bounds }
         });
         ShadingContext {
@@ -311,6 +313,14 @@ impl PreparedFrame {
             surface,
             albedo,
             motion_vectors: flow.then_some(&self.motion_vectors),
+            lit_polygons: self.lighting.polygons.is_in_use().then_some(lit_polygons),
+        }
+    }
+
+    /// Empties the table of lit polygons for this frame.
+    pub(crate) fn clear_lit_polygons(&self, table: &mut LitPolygons) {
+        if let Some(projection) = self.projection.filter(|_| self.lighting.polygons.is_in_use()) {
+            table.clear(projection.world_from_camera.translation, self.lighting.passes());
         }
     }
 }

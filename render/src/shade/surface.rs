@@ -23,6 +23,8 @@ pub(crate) struct Surface<S: Simd> {
     /// Texture coordinates, and their number per meter of surface.
     pub(crate) uv: [F<S>; 2],
     pub(crate) uv_density: F<S>,
+    /// Barycentric coordinates in the triangle of a mesh; of other shapes, any.
+    pub(crate) shares: [F<S>; 3],
 }
 
 /// Points on surfaces, as origins of rays.
@@ -103,6 +105,7 @@ pub(crate) fn surface<S: Simd>(
     };
     let zero = splat(s, 0.0);
     let (t, normal, shading, uv, uv_density);
+    let mut shares = [zero; 3];
     if let Some(mesh) = source.placed.mesh(source.instance) {
         let [x, y, z] = &camera.rotation;
         let axis = match lens_rays {
@@ -111,6 +114,7 @@ pub(crate) fn surface<S: Simd>(
         };
         let hit = intersect_triangles(s, mesh, source.first_id, ids, lanes, o, d, axis);
         (t, normal, shading, uv, uv_density) = (hit.t, hit.normal, hit.shading, hit.uv, hit.uv_density);
+        shares = hit.shares;
     } else {
         let hit = primitive::intersect(s, &source.instance.shape, o, d, projection.near);
         t = hit.t;
@@ -138,6 +142,7 @@ pub(crate) fn surface<S: Simd>(
         local_position,
         uv,
         uv_density,
+        shares,
     }
 }
 
@@ -147,6 +152,7 @@ struct TriangleHit<S: Simd> {
     shading: V3<S>,
     uv: [F<S>; 2],
     uv_density: F<S>,
+    shares: [F<S>; 3],
 }
 
 #[inline(always)]
@@ -220,5 +226,5 @@ fn intersect_triangles<S: Simd>(
         // Square root of the ratio of areas, in the texture and on the surface.
         uv_density = (max(square, -square) * area.sqrt() * inverse).sqrt();
     }
-    TriangleHit { t: depth, normal: normal.unit(s), shading, uv, uv_density }
+    TriangleHit { t: depth, normal: normal.unit(s), shading, uv, uv_density, shares: [ka, kb, kc] }
 }

@@ -209,9 +209,11 @@ fn sample_levels<S: Simd>(
     out
 }
 
-/// Two horizontally adjacent texels as eight bytes; 0 beyond the last texel.
+/// Two horizontally adjacent texels as eight bytes; 0 beyond the last texel. Both indices have 32 bits, so that their sum
+/// needs no check.
 #[inline(always)]
-fn pair(bytes: &[u8], from: usize) -> u64 {
+fn pair(bytes: &[u8], texel: i32, row: i32) -> u64 {
+    let from = 4 * (texel as u32 as usize + row as u32 as usize);
     match bytes.get(from..from + 8) {
         Some(&[a, b, c, d, e, f, g, h]) => u64::from_le_bytes([a, b, c, d, e, f, g, h]),
         _ => 0,
@@ -224,13 +226,13 @@ fn bilinear<S: Simd>(s: S, level: &MipLevel, [x, y]: [F<S>; 2], [fx, fy]: [F<S>;
     let stride = level.width() as i32 + 1;
     let at = select_i(lanes, y.to_int() * stride + x.to_int(), splat_i(s, 0));
     let at: [i32; LANES] = at.array();
-    let (bytes, next_row) = (level.bytes(), 4 * stride as usize);
+    let bytes = level.bytes();
     // Written out: `from_fn` stays a call, and a loop goes through memory.
     macro_rules! pairs {
-        ($row:expr, $($lane:literal)*) => { [$(pair(bytes, 4 * at[$lane] as usize + $row)),*] };
+        ($row:expr, $($lane:literal)*) => { [$(pair(bytes, at[$lane], $row)),*] };
     }
     let above = pairs!(0, 0 1 2 3 4 5 6 7 8 9 10 11 12 13 14 15);
-    let below = pairs!(next_row, 0 1 2 3 4 5 6 7 8 9 10 11 12 13 14 15);
+    let below = pairs!(stride, 0 1 2 3 4 5 6 7 8 9 10 11 12 13 14 15);
     let ([a, b], [c, d]) = (halves(s, &above), halves(s, &below));
     let (a, b, c, d) = (a.bytes(), b.bytes(), c.bytes(), d.bytes());
     let mut out = a;

@@ -12,7 +12,7 @@ use crate::request::{RasterCfg, RenderRequest};
 use crate::shutter::Shutter;
 use crate::simd::all_levels;
 use crate::visibility::View;
-use kinetoscope_scene::{Haze, Light, LightKind, PoseF32, RenderScene};
+use kinetoscope_scene::{Haze, Light, LightKind, LightingSpace, OpenGlRules, PoseF32, RenderScene, Tessellation};
 use kinetoscope_testkit::scenes::{TestRng, humanoid, random_scene};
 
 const RENDERERS: [Renderer; 4] = [Renderer::Raster, Renderer::FastRayTraced, Renderer::Hybrid, FEW_PATHS];
@@ -46,6 +46,34 @@ fn raster() {
         assert_same_bits(&format!("{samples} samples"), (3, &small), &[1], &[3]);
         let large = |k| TestFrame { cfg, ..rich(k as u64 + 1, sizes[k], 3.0) };
         assert_same_bits(&format!("sizes, {samples} samples"), (9, &large), &[1, 2, 3, 8], &[1, 2, 3, 5, 9]);
+    }
+}
+
+/// With the rules of MuJoCo's OpenGL renderer, light at the corners of polygons is kept for later pixels, and blocks that
+/// one plane covers are not drawn sample by sample.
+#[test]
+fn corners_of_polygons() {
+    let sizes = [[203, 151], [64, 64], [97, 301]];
+    for transparent in [false, true] {
+        let still = |k: usize| {
+            let seed = k as u64 + 1;
+            let mut still = rich(seed, sizes[k], 1.0);
+            if !transparent {
+                let (lights, haze) = (still.scene.lights.clone(), still.scene.haze);
+                still.scene = random_scene(&mut TestRng(seed), 1.0).0;
+                (still.scene.lights, still.scene.haze) = (lights, haze);
+            }
+            still.scene.lighting_space = LightingSpace::Display;
+            still.scene.opengl = Some(OpenGlRules {
+                shadow_clip: 10.0,
+                shadow_scale: 1.0,
+                culls_backs: false,
+                is_additive: false,
+                tessellation: Some(Tessellation::default()),
+            });
+            still
+        };
+        assert_same_bits(&format!("corners, transparent: {transparent}"), (3, &still), &[1, 2, 3], &[1, 3]);
     }
 }
 

@@ -99,6 +99,42 @@ pub(crate) struct RayTracer {
     /// Unbounded instances, which are outside of the BVH.
     unbounded: Vec<u32>,
     bvh: InstanceBvh,
+    /// Bounds of the instances that do not move during the exposure, if all are bounded.
+    round_bounds: Vec<RoundBounds>,
+}
+
+/// Bounds of an instance in the world: a ball, and a cylinder without ends through its center. Both are enlarged by the
+/// error of single precision.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct RoundBounds {
+    pub(crate) instance: u32,
+    pub(crate) center: [f32; 3],
+    pub(crate) radius: f32,
+    /// Unit vector along the longest side.
+    pub(crate) axis: [f32; 3],
+    /// Radius of the cylinder \[m\].
+    pub(crate) across: f32,
+}
+
+impl RoundBounds {
+    /// Enlargement, as a fraction of size and coordinates.
+    const MARGIN: f64 = 1e-3;
+
+    fn new(instance: u32, pose: &PoseF64, [lo, hi]: [V3; 2]) -> Self {
+        let half = [0, 1, 2].map(|k| 0.5 * (hi[k] - lo[k]));
+        let middle = [0, 1, 2].map(|k| 0.5 * (hi[k] + lo[k]));
+        let center: V3 = [0, 1, 2].map(|k| dot(pose.rotation[k], middle) + pose.translation[k]);
+        let longest = (0..3).fold(0, |best, k| if half[k] > half[best] { k } else { best });
+        let square = dot(half, half);
+        let pad = Self::MARGIN * (square.sqrt() + center.iter().fold(0.0f64, |most, x| most.max(x.abs())));
+        Self {
+            instance,
+            center: center.map(|x| x as f32),
+            radius: (square.sqrt() + pad) as f32,
+            axis: pose.rotation.map(|row| row[longest] as f32),
+            across: ((square - half[longest] * half[longest]).max(0.0).sqrt() + pad) as f32,
+        }
+    }
 }
 
 impl InstanceGeometry {
@@ -133,6 +169,7 @@ impl RayTracer {
         self.geometries.capacity() * size_of::<Option<InstanceGeometry>>()
             + self.instances.capacity() * size_of::<TracedInstance>()
             + self.unbounded.capacity() * size_of::<u32>()
+            + self.round_bounds.capacity() * size_of::<RoundBounds>()
             + self.bvh.bytes()
     }
 
@@ -159,7 +196,8 @@ impl RayTracer {
     /// Places all instances, for rays in any direction at any time. `before` holds the poses at time 0; without it, all
     /// instances are static. [`prepare_geometry`](Self::prepare_geometry) must be called before.
     pub(crate) fn place(&mut self, scene: &RenderScene, poses: &[PoseF32], before: Option<&[PoseF32]>) {
-        let Self { geometries, instances: things, unbounded, bvh } = self;
+        let Self { geometries, instances: things, unbounded, bvh, round_bounds } = self;
+        round_bounds.clear();
         things.clear();
         unbounded.clear();
         bvh.clear();
@@ -172,7 +210,10 @@ impl RayTracer {
             let casts_shadow = scene.instances()[k].group != Marker::GROUP;
             things.push(TracedInstance { instance: k as u32, world_from_instance, motion, alpha, casts_shadow });
             match (body.bounds(), motion) {
-                (Some(bounds), None) => bvh.add(thing, &world_from_instance, bounds),
+                (Some(bounds), None) => {
+                    bvh.add(thing, &world_from_instance, bounds);
+                    round_bounds.push(RoundBounds::new(k as u32, &world_from_instance, bounds));
+                }
                 (Some(bounds), Some(motion)) => bvh.add_moving(thing, &motion, bounds),
                 (None, _) => unbounded.push(thing),
             }
@@ -185,6 +226,11 @@ impl RayTracer {
     pub(crate) fn bounds_without(&self, instance: u32) -> Option<[V3; 2]> {
         let alone = self.unbounded.iter().all(|&thing| self.instances[thing as usize].instance == instance);
         alone.then(|| self.bvh.bounds().unwrap_or([[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]]))
+    }
+
+    /// Bounds of the bounded instances that are not hidden, without motion.
+    pub(crate) fn round_bounds(&self) -> &[RoundBounds] {
+        &self.round_bounds
     }
 
     /// Pose of an instance in the world at a time from 0 to [`END_TIME`](motion::END_TIME); `None` for hidden

@@ -149,19 +149,28 @@ pub(crate) fn intersect<S: Simd>(s: S, shape: &Shape, o: V3<S>, d: V3<S>, near: 
             if !near_axis.any_true() {
                 return none();
             }
-            let caps = slab(s, o.z, d.z, h);
-            let mut all = Interval { enter: max(side.enter, caps.enter), leave: min(side.leave, caps.leave) };
-            let empty = all.enter.simd_gt(all.leave);
-            all.enter = select(empty, splat(s, EMPTY), all.enter);
-            all.leave = select(empty, splat(s, -EMPTY), all.leave);
-            for end in [h, -h] {
-                let one = intersect_sphere(s, V3 { z: o.z - end, ..o }, d, r);
-                all = Interval { enter: min(all.enter, one.enter), leave: max(all.leave, one.leave) };
+            // Most rays enter through the side, where nothing else is nearer.
+            let on_side = near_axis
+                & abs(o.z + d.z * side.enter).simd_le(splat(s, h))
+                & side.enter.simd_ge(splat(s, near))
+                & side.enter.simd_lt(splat(s, f32::MAX));
+            let (mut hit, mut t) = (on_side, side.enter);
+            if (near_axis & !on_side).any_true() {
+                let caps = slab(s, o.z, d.z, h);
+                let mut all = Interval { enter: max(side.enter, caps.enter), leave: min(side.leave, caps.leave) };
+                let empty = all.enter.simd_gt(all.leave);
+                all.enter = select(empty, splat(s, EMPTY), all.enter);
+                all.leave = select(empty, splat(s, -EMPTY), all.leave);
+                for end in [h, -h] {
+                    let one = intersect_sphere(s, V3 { z: o.z - end, ..o }, d, r);
+                    all = Interval { enter: min(all.enter, one.enter), leave: max(all.leave, one.leave) };
+                }
+                let (elsewhere, at, _) = first_surface(s, all, near);
+                (hit, t) = (on_side | (elsewhere & near_axis), select(on_side, t, at));
             }
-            let (hit, t, _) = first_surface(s, all, near);
             let p = o.add(d.scale(t));
             let z = p.z - max(min(p.z, splat(s, h)), splat(s, -h));
-            PrimitiveHit { hit: hit & near_axis, t, normal: V3 { x: p.x, y: p.y, z }, face: splat_u(s, 0) }
+            PrimitiveHit { hit, t, normal: V3 { x: p.x, y: p.y, z }, face: splat_u(s, 0) }
         }
         Shape::Cylinder(cylinder) => {
             let side = infinite_cylinder(s, o, d, cylinder.radius);
