@@ -158,7 +158,10 @@ def test_a_program_as_a_viewer():
         "thread = threading.Thread(target=sim.update, args=(20,), daemon=True)\nthread.start()\n"
         "def reached(steps):\n"
         "    for _ in range(400):\n"
-        "        if round(sim.time[0] / sim.physics_dt) == steps and viewer.state['paused']:\n            return True\n"
+        "        try:\n            state = viewer.state\n"
+        # Before the first snapshot.
+        "        except ks.ViewerError:\n            state = {'paused': False}\n"
+        "        if round(sim.time[0] / sim.physics_dt) == steps and state['paused']:\n            return True\n"
         "        time.sleep(0.05)\n"
         "assert reached(1)\ntime.sleep(0.3)\nassert reached(1) and thread.is_alive()\n"
         "viewer.step(3)\nassert reached(4)\nviewer.step()\nassert reached(5)\ntime.sleep(0.3)\nassert reached(5)\n"

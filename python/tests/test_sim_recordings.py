@@ -183,7 +183,9 @@ def test_killed_recordings_are_recovered(tmp_path):
     process = subprocess.Popen([sys.executable, "-c", KILLED, path], stdout=subprocess.PIPE, text=True)
     assert process.stdout.readline() == "started\n"
     # What the writer thread received is in the file half a second later.
-    time.sleep(2)
+    deadline, part = time.monotonic() + 60, tmp_path / "run.mcap.part"
+    while time.monotonic() < deadline and not (part.exists() and part.stat().st_size > 100_000):
+        time.sleep(0.1)
     process.send_signal(signal.SIGKILL)
     process.wait(timeout=60)
     assert not path.exists()

@@ -156,7 +156,8 @@ mod tests {
     use super::*;
     use std::collections::BTreeSet;
 
-    /// The crates that a command builds, each with its version and features. `kinds` are the dependencies that count: those of tests and examples are among them, or not.
+    /// The crates that a command builds, each with its version and features. `kinds` are the dependencies that count:
+    /// those of tests and examples are among them, or not.
     fn crates(kinds: &str, args: &[&str]) -> BTreeSet<String> {
         let root = concat!(env!("CARGO_MANIFEST_DIR"), "/..");
         let tree = ["tree", "--locked", "--offline", "--prefix", "none"];

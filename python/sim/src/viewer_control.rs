@@ -120,7 +120,7 @@ impl Viewer {
         Err(Failure::new(Class::Viewer, message).into())
     }
 
-    /// The viewer. The lock is never held during a call into the simulation or into Python.
+    /// The viewer. The lock is never held during a step, or while waiting for Python's lock.
     fn lock(&self) -> MutexGuard<'_, Option<viewer::Viewer>> {
         self.inner.lock().unwrap_or_else(PoisonError::into_inner)
     }

@@ -4,8 +4,8 @@
 //! Only operations that IEEE 754 defines to the bit are used (add, subtract, multiply, divide, square root, compare),
 //! and never fused: so every instruction set gives the same image. [`Scalar`] is the reference: plain loops. As a
 //! level of the renderer it is compiled for tests, and for targets whose baseline has no known vectors: on x86-64 it would
-//! be a third of the code. (The library has a scalar level of
-//! its own, but inlining sixteen-wide loops everywhere took over ten minutes to compile.)
+//! be a third of the code. (The library has a scalar level of its own, but inlining sixteen-wide loops everywhere took over
+//! ten minutes to compile.)
 
 mod double;
 mod narrow;

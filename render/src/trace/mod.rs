@@ -99,7 +99,7 @@ pub(crate) struct RayTracer {
     /// Unbounded instances, which are outside of the BVH.
     unbounded: Vec<u32>,
     bvh: InstanceBvh,
-    /// Bounds of the instances that do not move during the exposure, if all are bounded.
+    /// Bounds of the bounded instances that do not move during the exposure.
     round_bounds: Vec<RoundBounds>,
 }
 

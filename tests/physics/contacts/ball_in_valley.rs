@@ -2,8 +2,8 @@
 //! friction, each side carries m g/(2 cos α), as if the ball had the weight g/(2 cos α) on a plane, into which it sinks by r
 //! ([`soft_contact`](crate::rigid_body::soft_contact)). The center of the ball, of radius R, is (R - r)/cos α above the line.
 //!
-//! Tolerance: MuJoCo finds the depth in a mesh to 1e-6 m (`mjOption`'s tolerance of convex collisions), over cos α. Air and
-//! contacts damp the motion by e^-20 in the time.
+//! Tolerance: MuJoCo finds the depth in a mesh to 1e-6 m (`mjOption`'s tolerance of convex collisions), over cos α. Air
+//! alone damps oscillations by e^-10 in the time; contacts damp more.
 //!
 //! On the convex hull of the mesh, the ball rests on a lid over the valley.
 
