@@ -49,7 +49,7 @@ fn rows_and_persistent_data() {
         data.qvel_mut().iter_mut().enumerate().for_each(|(k, v)| *v = (1.3 * i as f64 + k as f64).sin());
         data.ctrl_mut()[0] = 0.3 * i as f64;
     };
-    // What happens to an environment after a block of steps. The others keep the inputs of bodies that they share.
+    // Changes an environment after a block of steps. The others keep the inputs of bodies that they share.
     let change = |block: usize, i: usize, env: &mut SimEnv| match (block, i) {
         (1, 1 | 4) => env.set_wrenches(|wrenches| {
             let axes = Some(UnitQuaternion::from_euler_angles(0.3, 0.0, 0.1 * i as f64));
