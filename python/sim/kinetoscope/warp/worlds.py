@@ -311,6 +311,10 @@ class Worlds:
         if summary.overflow & SIZE_BITS & ~ROW_BITS:
             contacts = sizes.enlarged(contacts, math.ceil(summary.contacts / self.num_envs))
         sizes.check_memory(self.data, self.device, rows, contacts)
+        self.resize(rows, contacts)
+
+    def resize(self, rows: int, contacts: int) -> None:
+        """Replaces the arrays for constraint rows and contacts. The state and the inputs stay."""
         self.graphs.clear()
         # Freed before the larger arrays are made.
         del self.data
@@ -318,6 +322,7 @@ class Worlds:
         for name, array in self.kept_arrays.items():
             setattr(self.data, name, array)
         self.rows, self.contacts = rows, contacts
+        self.is_forward_needed = True
 
     def begin_call(self) -> None:
         """Forgets divergences that were reported."""
