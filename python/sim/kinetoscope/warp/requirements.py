@@ -1,0 +1,69 @@
+"""Check of the packages and devices that physics on a device needs."""
+
+from __future__ import annotations
+
+import importlib.metadata
+import importlib.util
+from typing import Any
+
+from .errors import DeviceError
+
+# Fields of Warp's model and data, and the order of its kernels, change between releases.
+VERSIONS = {"mujoco-warp": "4.0.0", "warp-lang": "1.19.0"}
+COMMAND = "pip install " + " ".join(f'"{name}=={version}"' for name, version in VERSIONS.items())
+# The export, and the drive rows, are written for this series of MuJoCo.
+MUJOCO = "4.0"
+CPU = "warp-cpu"
+
+
+def installed_versions() -> dict[str, str]:
+    """Versions of the installed packages. Raises DeviceError if one is missing or has another version."""
+    found = {}
+    for name, expected in VERSIONS.items():
+        try:
+            found[name] = importlib.metadata.version(name)
+        except importlib.metadata.PackageNotFoundError:
+            raise DeviceError(f"physics on a device needs {name} {expected}, which is not installed; install it with: {COMMAND}") from None
+        if found[name] != expected:
+            raise DeviceError(f"physics on a device needs {name} {expected}, but {found[name]} is installed; install it with: {COMMAND}")
+    if importlib.util.find_spec("mujoco") is None:
+        raise DeviceError(f"physics on a device needs the package mujoco {MUJOCO}, which is not installed; install it with: {COMMAND}")
+    return found
+
+
+def find_device(name: str) -> tuple[Any, dict[str, str]]:
+    """Warp device of `name`, which is "cuda", "cuda:N" or "warp-cpu", and the versions of the packages.
+
+    Raises DeviceError for a missing package, an unknown name, a missing GPU and an old driver.
+    """
+    kind, _, index = name.partition(":")
+    if name != CPU and not (kind == "cuda" and (index.isdecimal() or name == "cuda")):
+        raise DeviceError(f'unknown device "{name}"; expected "cuda", "cuda:N" or "{CPU}"')
+    versions = installed_versions()
+    try:
+        import mujoco
+        import warp as wp
+    except ImportError as error:
+        raise DeviceError(f"a package for physics on a device cannot be imported ({error}); install it again with: {COMMAND} --force-reinstall") from error
+    versions["mujoco"] = mujoco.__version__
+    if not mujoco.__version__.startswith(f"{MUJOCO}."):
+        raise DeviceError(f'physics on a device needs MuJoCo {MUJOCO}, but {mujoco.__version__} is installed; install it with: pip install "mujoco=={MUJOCO}.*"')
+    # Warp prints a banner to stdout at its initialization.
+    wp.config.quiet = True
+    wp.init()
+    if name == CPU:
+        return wp.get_device("cpu"), versions
+    devices = wp.get_cuda_devices()
+    found = ", ".join(f"{device.alias} ({device.name})" for device in devices)
+    if not devices:
+        raise DeviceError(f'device "{name}" needs an NVIDIA GPU and its driver, but Warp found none; "{CPU}" runs the same kernels on the CPU')
+    number = int(index) if index else 0
+    if number >= len(devices):
+        raise DeviceError(f'device "{name}" does not exist; found {found}; "{CPU}" runs the same kernels on the CPU')
+    device = devices[number]
+    # The solver iterates inside a CUDA graph until all environments converge.
+    if not wp.is_conditional_graph_supported():
+        raise DeviceError(f'the driver of "{name}" ({device.name}) is too old: CUDA graphs with conditional nodes need CUDA 12.4; install a newer driver from NVIDIA')
+    if not wp.is_mempool_enabled(device):
+        raise DeviceError(f'"{name}" ({device.name}) has no memory pools, which CUDA graphs need; "{CPU}" runs the same kernels on the CPU')
+    return device, versions
