@@ -41,7 +41,8 @@ impl Batch {
     /// Does `count` MuJoCo steps on the device, if there is one, and captures the quantities of `capture` in the last one.
     /// Returns the number of steps that remain for the threads of this process.
     pub(super) fn step_on_device(&self, count: u32, capture: Option<&CaptureRequest>) -> u32 {
-        let Some(device) = &self.device else { return count };
+        // Nothing moves in a scene without degrees of freedom; a device may not support it.
+        let Some(device) = self.device.as_ref().filter(|_| self.model.nv() > 0) else { return count };
         let mut device = lock(device);
         let mut left = count;
         while left > 0 {

@@ -193,7 +193,7 @@ impl DeviceMirror {
         }
     }
 
-    /// Loads a scene. All rows are sent before the next step.
+    /// Loads a scene, unless nothing moves in it. All rows are sent before the next step.
     ///
     /// # Errors
     /// The device cannot simulate the scene, failed, or the files of the scene cannot be written to a temporary folder.
@@ -204,9 +204,11 @@ impl DeviceMirror {
         num_envs: usize,
     ) -> Result<(), DeviceError> {
         let failed = |error: std::io::Error| DeviceError::Failed(format!("the scene cannot be written: {error}"));
-        let folder = tempfile::tempdir().map_err(failed)?;
-        scene.write_to(folder.path()).map_err(failed)?;
-        self.physics.load(folder.path(), scene.json(), num_envs)?;
+        if scene.moves() {
+            let folder = tempfile::tempdir().map_err(failed)?;
+            scene.write_to(folder.path()).map_err(failed)?;
+            self.physics.load(folder.path(), scene.json(), num_envs)?;
+        }
         self.sent.clear();
         self.patches = vec![None; num_envs];
         self.table = Arc::clone(table);

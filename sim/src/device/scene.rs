@@ -8,7 +8,7 @@ use crate::mjcf::document::Integrator;
 use crate::mjcf::scene::terrain_file;
 use crate::simulation::Simulation;
 use crate::simulation_cfg::SimulationManagerCfg;
-use kinetoscope_mujoco::{Model, NumberArray};
+use kinetoscope_mujoco::{Model, NumberArray, ObjectKind};
 use serde_json::{Value, json};
 use std::path::Path;
 
@@ -17,7 +17,7 @@ const VERSION: u32 = 1;
 
 /// Arrays that the device takes from our compiled model: a later MuJoCo may compile other numbers from the same document,
 /// and drives change some after compilation.
-const COPIED_ARRAYS: [NumberArray; 8] = [
+const COPIED_ARRAYS: [NumberArray; 7] = [
     NumberArray::BODY_MASS,
     NumberArray::BODY_INERTIA,
     NumberArray::BODY_IPOS,
@@ -25,7 +25,6 @@ const COPIED_ARRAYS: [NumberArray; 8] = [
     NumberArray::DOF_ARMATURE,
     NumberArray::DOF_DAMPING,
     NumberArray::DOF_FRICTIONLOSS,
-    NumberArray::GEOM_FRICTION,
 ];
 
 /// A scene for a device.
@@ -35,6 +34,7 @@ pub(crate) struct DeviceScene<'a> {
     files: Vec<(String, std::borrow::Cow<'a, [u8]>)>,
     /// JSON object with sizes, drives and numbers of the compiled model.
     json: String,
+    moves: bool,
 }
 
 impl<'a> DeviceScene<'a> {
@@ -69,7 +69,12 @@ impl<'a> DeviceScene<'a> {
         let terrains = terrains.map(|(index, terrain)| (terrain_file(index), terrain.file().into()));
         let files = contents.files().map(|file| (file.name.clone(), file.bytes.as_slice().into()));
         let json = describe(model, &table).to_string();
-        Ok(Self { xml: &simulation.xml, files: terrains.chain(files).collect(), json })
+        Ok(Self { xml: &simulation.xml, files: terrains.chain(files).collect(), json, moves: model.nv() > 0 })
+    }
+
+    /// True if the scene has a degree of freedom.
+    pub(crate) fn moves(&self) -> bool {
+        self.moves
     }
 
     /// The JSON object.
@@ -96,8 +101,10 @@ fn describe(model: &Model, table: &DriveTable) -> Value {
     let drives = table.drives.iter().filter(|drive| drive.realization == Realization::ConstraintRow);
     let drives = drives.map(|drive| {
         let gains = &drive.initial;
+        let joint = (0..model.njnt()).find(|joint| model.jnt_dofadr()[*joint] as usize == drive.dof);
+        let name = joint.and_then(|joint| model.name(ObjectKind::Joint, joint)).unwrap_or_default();
         json!({
-            "dof": drive.dof, "qpos": drive.qpos, "ctrl": drive.ctrl, "stiffness": gains.kp, "damping": gains.kd,
+            "name": name, "dof": drive.dof, "qpos": drive.qpos, "ctrl": drive.ctrl, "stiffness": gains.kp, "damping": gains.kd,
             "max_effort": gains.max_effort.is_finite().then_some(gains.max_effort),
         })
     });

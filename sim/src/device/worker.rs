@@ -36,9 +36,9 @@ struct Answer {
     /// Bytes that follow.
     #[serde(default)]
     bytes: usize,
-    /// Report on a step, as JSON.
+    /// Report on a step.
     #[serde(default)]
-    report: Option<String>,
+    report: Option<Value>,
     /// Error of the worker.
     #[serde(default)]
     error: String,
@@ -142,7 +142,8 @@ impl DevicePhysics for Worker {
 
     fn step(&mut self, steps: u32, capture: &[&str]) -> Result<String, DeviceError> {
         let (answer, _) = self.request(json!({ "op": "step", "steps": steps, "capture": capture }), &[])?;
-        answer.report.ok_or_else(|| DeviceError::Failed("the worker sent no report on a step".into()))
+        let report = answer.report.map(|report| report.to_string());
+        report.ok_or_else(|| DeviceError::Failed("the worker sent no report on a step".into()))
     }
 
     fn read(&mut self, array: &str) -> Result<Vec<f32>, DeviceError> {

@@ -2,13 +2,9 @@
 
 from __future__ import annotations
 
-from ..errors import ArgumentError, KinetoscopeError, UnknownNameError
+from ..errors import ArgumentError, DeviceError, KinetoscopeError, UnknownNameError
 
 __all__ = ["ArgumentError", "DeviceError", "KinetoscopeError", "UnknownNameError", "UnsupportedSceneError"]
-
-
-class DeviceError(KinetoscopeError, RuntimeError):
-    """A device, or a package that it needs, is missing or unsuitable; the message says how to repair that."""
 
 
 class UnsupportedSceneError(DeviceError):
