@@ -209,6 +209,12 @@ impl DeviceMirror {
             scene.write_to(folder.path()).map_err(failed)?;
             self.physics.load(folder.path(), scene.json(), num_envs)?;
         }
+        self.reset_for(table, num_envs);
+        Ok(())
+    }
+
+    /// Forgets what the device has, which is a new scene with the drives of `table`.
+    pub(super) fn reset_for(&mut self, table: &Arc<DriveTable>, num_envs: usize) {
         self.sent.clear();
         self.patches = vec![None; num_envs];
         self.table = Arc::clone(table);
@@ -216,7 +222,6 @@ impl DeviceMirror {
         let rows = drives.filter(|(_, drive)| drive.realization == Realization::ConstraintRow);
         self.row_drives = rows.map(|(index, _)| index).collect();
         self.failed = None;
-        Ok(())
     }
 
     /// Error after which the device does not step again.

@@ -12,6 +12,8 @@
 mod captured;
 mod mirror;
 mod scene;
+#[cfg(test)]
+mod tests;
 mod worker;
 
 pub(crate) use mirror::DeviceMirror;
@@ -165,26 +167,5 @@ pub(crate) fn open(device: Device) -> Result<Option<Box<dyn DevicePhysics>>, Dev
         (Device::Cpu, _) => Ok(None),
         (device, Some(opener)) => opener(device).map(Some),
         (device, None) => Ok(Some(Box::new(worker::Worker::start(device)?))),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn names() {
-        for (text, device) in [
-            ("cpu", Device::Cpu),
-            ("cuda:0", Device::Cuda(0)),
-            ("cuda:7", Device::Cuda(7)),
-            ("warp-cpu", Device::WarpCpu),
-        ] {
-            assert_eq!((text.parse(), device.to_string().as_str()), (Ok(device), text));
-        }
-        assert_eq!("cuda".parse(), Ok(Device::Cuda(0)));
-        for wrong in ["", "gpu", "cuda:", "cuda:-1", "cuda:x", "CPU"] {
-            assert_eq!(wrong.parse::<Device>(), Err(UnknownDevice(wrong.into())));
-        }
     }
 }
