@@ -14,6 +14,58 @@ import numpy as np
 
 UNLIMITED = 1e15
 
+SERVO = ('<general name="{0}" joint="{0}" gainprm="{1}" biastype="affine" biasprm="0 -{1} -{2}" forcelimited="true" '
+         'forcerange="-{3} {3}"/>')
+HEAD = ('<mujoco><compiler angle="radian" autolimits="false" inertiafromgeom="false"/><option timestep="0.01" integrator="{integrator}" '
+        'cone="{cone}" impratio="{impratio}" iterations="100" solver="{solver}"/><worldbody><geom name="ground" type="plane" size="9 9 1"/>')
+# Axis, length [m] and mass [kg] of the links of an arm, and the limits of its drives [N m].
+LINKS = (("0 0 1", 0.1, 6, 113), ("0 1 0", 0.4, 5, 113), ("0 1 0", 0.4, 3, 70), ("0 0 1", 0.1, 1.5, 25), ("0 1 0", 0.1, 1.5, 25),
+         ("0 0 1", 0.1, 1, 19))
+ARM_TARGET = np.array([0.0, 0.5, 1.2, 0.3, 0.5, 0.0, -0.4, -0.6])
+# The hand presses the ground.
+PRESSING_TARGET = np.array([0.2, 1.6, 0.7, 0.0, 0.1, 0.0, 0.0, 0.0])
+
+
+def head(integrator="Euler", cone="pyramidal", impratio=1, solver="Newton"):
+    return HEAD.format(integrator=integrator, cone=cone, impratio=impratio, solver=solver)
+
+
+def arm_xml(armature=0.0, **options):
+    """An arm of 6 joints, with two fingers that have two coupled joints each: 10 degrees of freedom, 8 drives."""
+    bodies, closing = "", ""
+    for k, (axis, length, mass, _) in enumerate(LINKS):
+        offset = "0 0 0.1" if k == 0 else f"0 0 {LINKS[k - 1][1]}"
+        bodies += (
+            f'<body name="link{k}" pos="{offset}"><inertial pos="0 0 {length / 2}" mass="{mass}" diaginertia="0.02 0.02 0.01"/>'
+            f'<joint name="j{k}" axis="{axis}" limited="true" range="-3 3" armature="{armature}"/>'
+            f'<geom name="link{k}" type="capsule" fromto="0 0 0 0 0 {length}" size="0.04" contype="2" conaffinity="1"/>'
+        )
+        closing += "</body>"
+    fingers = "".join(
+        f'<body name="finger{side}" pos="{x} 0 0.12"><inertial pos="0 0 0.02" mass="0.02" diaginertia="1e-5 1e-5 1e-5"/>'
+        f'<joint name="f{side}" axis="0 1 0" limited="true" range="-1.5 1.5"/>'
+        f'<geom name="finger{side}" type="box" pos="0 0 0.02" size="0.008 0.01 0.02" contype="2" conaffinity="1"/>'
+        f'<body name="tip{side}" pos="0 0 0.04"><inertial pos="0 0 0.02" mass="0.01" diaginertia="1e-5 1e-5 1e-5"/>'
+        f'<joint name="t{side}" axis="0 1 0" limited="true" range="-1.5 1.5"/>'
+        f'<geom name="tip{side}" type="box" pos="0 0 0.02" size="0.007 0.01 0.02" contype="2" conaffinity="1"/></body></body>'
+        for side, x in (("a", -0.04), ("b", 0.04))
+    )
+    equalities = "".join(f'<joint joint1="t{side}" joint2="f{side}" polycoef="0 0.8 0 0 0"/>' for side in "ab")
+    servos = "".join(SERVO.format(f"j{k}", 10000, 1000, limit) for k, (*_, limit) in enumerate(LINKS))
+    servos += "".join(SERVO.format(f"f{side}", 1000, 100, 2) for side in "ab")
+    return f"{head(**options)}{bodies}{fingers}{closing}</worldbody><equality>{equalities}</equality><actuator>{servos}</actuator></mujoco>"
+
+
+def box_xml(**options):
+    """A box of 2 kg on four feet that stands on the ground, and a static block beside it."""
+    feet = "".join(f'<geom type="sphere" size="0.03" pos="{x} {y} -0.1" contype="2" conaffinity="1"/>'
+                   for x in (-0.2, 0.2) for y in (-0.1, 0.1))
+    return (
+        f'{head(**options)}<body name="block" pos="3 0 0.2"><geom name="block" type="box" size="0.2 0.2 0.2" contype="1" conaffinity="2"/></body>'
+        f'<body name="box" pos="0 0 0.13"><freejoint/><inertial pos="0 0 0" mass="2" diaginertia="0.02 0.03 0.04"/>{feet}</body>'
+        "</worldbody></mujoco>"
+    )
+
 
 def drives_of(model):
     """Drives of the position servos in an exported scene: their gains and limits are those of the actuators."""

@@ -126,17 +126,26 @@ def check_state(
     rows: wp.array[int],
     contacts: wp.array[int],
     pairs: wp.array[int],
+    overflow: wp.array[int],
+    size_bits: int,
+    step_index: wp.array[int],
     # outputs
     bad: wp.array[int],
     peak_rows: wp.array[int],
     peak_contacts: wp.array[int],
+    first_overflow: wp.array[int],
 ):
     """Marks environments with a number that is not finite or too large, and keeps the largest numbers of rows and contacts."""
     w, i = wp.tid()
     if i == 0:
-        peak_rows[w] = wp.max(peak_rows[w], rows[w])
-        if w == 0:
-            peak_contacts[0] = wp.max(peak_contacts[0], wp.max(contacts[0], pairs[0]))
+        step = step_index[0]
+        if (overflow[w] & size_bits) != 0:
+            wp.atomic_min(first_overflow, 0, step)
+        # After a step that lacked rows, bodies fall into each other: those contacts do not count.
+        if step <= first_overflow[0]:
+            peak_rows[w] = wp.max(peak_rows[w], rows[w])
+            if w == 0:
+                peak_contacts[0] = wp.max(peak_contacts[0], wp.max(contacts[0], pairs[0]))
     if frozen[w] != 0:
         return
     value = float(0.0)

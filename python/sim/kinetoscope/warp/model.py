@@ -13,6 +13,7 @@ from .errors import DeviceError, UnsupportedSceneError
 
 SCENE_VERSION = 1
 SCENE_FILE = "scene.xml"
+FIELDS = ("timestep", "sizes", "model", "silent_actuators", "drives", "damped")
 
 # Arrays of the compiled model that the scene may replace.
 REPLACED = (
@@ -62,13 +63,7 @@ def load_scene(folder: str, text: str) -> Scene:
     """
     import mujoco
 
-    try:
-        scene = json.loads(text)
-        version = scene["version"]
-    except (ValueError, KeyError, TypeError) as error:
-        raise DeviceError(f"the numbers of the scene are not JSON of a scene: {error!r}") from error
-    if version != SCENE_VERSION:
-        raise DeviceError(f"the numbers of the scene have version {version!r}; expected {SCENE_VERSION}: install kinetoscope again")
+    scene = read_numbers(text)
     path = Path(folder) / SCENE_FILE
     try:
         model = mujoco.MjModel.from_xml_path(str(path))
@@ -79,9 +74,9 @@ def load_scene(folder: str, text: str) -> Scene:
     model.opt.timestep = scene["timestep"]
     drives = scene["drives"]
     damped = np.array(scene["damped"], dtype=float).reshape(-1, 2)
-    check_indices(model, drives, damped, scene.get("silent_actuators", []))
+    check_indices(model, drives, damped, scene["silent_actuators"])
     check_options(model, bool(drives))
-    prepare(model, [drive["dof"] for drive in drives], scene.get("silent_actuators", []))
+    prepare(model, [drive["dof"] for drive in drives], scene["silent_actuators"])
     return Scene(
         model=model,
         drive_names=[drive["name"] for drive in drives],
@@ -94,6 +89,21 @@ def load_scene(folder: str, text: str) -> Scene:
         damped=damped[:, 0].astype(np.int32),
         viscous_damping=damped[:, 1],
     )
+
+
+def read_numbers(text: str) -> dict[str, Any]:
+    """Fields of the JSON of a scene. Raises DeviceError for other JSON, and for another version."""
+    try:
+        scene = json.loads(text)
+    except ValueError as error:
+        raise DeviceError(f"the numbers of the scene are not JSON: {error}") from error
+    version = scene.get("version") if isinstance(scene, dict) else None
+    if version != SCENE_VERSION:
+        raise DeviceError(f"the numbers of the scene have version {version!r}; expected {SCENE_VERSION}: install kinetoscope again")
+    missing = [name for name in FIELDS if name not in scene]
+    if missing:
+        raise DeviceError(f"the numbers of the scene have no field {missing[0]}; expected {', '.join(FIELDS)}")
+    return scene
 
 
 def check_sizes(model: Any, sizes: dict[str, int]) -> None:

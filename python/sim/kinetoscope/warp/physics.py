@@ -43,7 +43,7 @@ class WarpPhysics:
     def load(self, folder: str, scene: str, num_envs: int) -> None:
         """Loads `scene.xml` of `folder` with the numbers of `scene`, JSON, into `num_envs` environments.
 
-        Replaces a scene that was loaded before. Raises UnsupportedSceneError for a scene that MuJoCo Warp does not support, and
+        Replaces a scene that was loaded before, also if it raises. Raises UnsupportedSceneError for a scene that MuJoCo Warp does not support, and
         DeviceError for one that does not fit into the memory of the device.
         """
         import warp as wp

@@ -48,8 +48,8 @@ def find_device(name: str) -> tuple[Any, dict[str, str]]:
     versions["mujoco"] = mujoco.__version__
     if not mujoco.__version__.startswith(f"{MUJOCO}."):
         raise DeviceError(f'physics on a device needs MuJoCo {MUJOCO}, but {mujoco.__version__} is installed; install it with: pip install "mujoco=={MUJOCO}.*"')
-    # Warp prints a banner to stdout at its initialization.
-    wp.config.quiet = True
+    # Warp prints its devices, and each kernel that it loads.
+    wp.config.log_level = max(wp.config.log_level, wp.LOG_WARNING)
     wp.init()
     if name == CPU:
         return wp.get_device("cpu"), versions

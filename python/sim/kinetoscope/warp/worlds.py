@@ -24,6 +24,8 @@ MOTION = ("xpos", "xquat", "subtree_com", "cvel", "cacc")
 WRENCHES = ("cfrc_int",)
 CAPTURES = ("contacts", "motion", "wrenches")
 CONTACT_COLUMNS = 20
+# Later than every step.
+NO_STEP = 2**31 - 1
 
 SIZE_BITS = int(
     mjw.OverflowType.NEFC | mjw.OverflowType.NJMAX_NNZ | mjw.OverflowType.BROADPHASE | mjw.OverflowType.NARROWPHASE | mjw.OverflowType.CCD
@@ -75,7 +77,8 @@ class Worlds:
         self.effort = wp.zeros((n, drives), dtype=float)
         self.frozen, self.bad, self.peak_rows = (wp.zeros(n, dtype=int) for _ in range(3))
         self.diverged_step = wp.full(n, -1, dtype=int)
-        self.step_index, self.peak_contacts, self.summary = (wp.zeros(k, dtype=int) for k in (1, 1, 4 + int(kernels.OVERFLOW_BITS)))
+        self.step_index, self.peak_contacts, self.first_overflow = (wp.zeros(1, dtype=int) for _ in range(3))
+        self.summary = wp.zeros(int(kernels.SUMMARY_BITS) + int(kernels.OVERFLOW_BITS), dtype=int)
         self.state_width = self.nq + 2 * self.nv + mjm.na
         self.kept = wp.zeros((n, self.state_width), dtype=float)
         self.block = [wp.empty_like(array) for array in self.block_arrays()]
@@ -127,8 +130,8 @@ class Worlds:
         wp.launch(
             kernels.check_state,
             dim=(self.num_envs, self.nq + 2 * self.nv),
-            inputs=[self.nq, self.nv, d.qpos, d.qvel, d.qacc, self.frozen, d.nefc, d.nacon, d.ncollision],
-            outputs=[self.bad, self.peak_rows, self.peak_contacts],
+            inputs=[self.nq, self.nv, d.qpos, d.qvel, d.qacc, self.frozen, d.nefc, d.nacon, d.ncollision, d.overflow, SIZE_BITS, self.step_index],
+            outputs=[self.bad, self.peak_rows, self.peak_contacts, self.first_overflow],
         )
 
     def settle(self) -> None:
@@ -264,6 +267,7 @@ class Worlds:
         self.data.overflow.zero_()
         self.peak_rows.zero_()
         self.peak_contacts.zero_()
+        self.first_overflow.fill_(NO_STEP)
         for graph in graphs:
             wp.capture_launch(graph)
         return self.summarize()
@@ -307,6 +311,10 @@ class Worlds:
         if summary.overflow & SIZE_BITS & ~ROW_BITS:
             contacts = sizes.enlarged(contacts, math.ceil(summary.contacts / self.num_envs))
         sizes.check_memory(self.data, self.device, rows, contacts)
+        self.resize(rows, contacts)
+
+    def resize(self, rows: int, contacts: int) -> None:
+        """Replaces the arrays for constraint rows and contacts. The state and the inputs stay."""
         self.graphs.clear()
         # Freed before the larger arrays are made.
         del self.data
@@ -314,6 +322,7 @@ class Worlds:
         for name, array in self.kept_arrays.items():
             setattr(self.data, name, array)
         self.rows, self.contacts = rows, contacts
+        self.is_forward_needed = True
 
     def begin_call(self) -> None:
         """Forgets divergences that were reported."""
