@@ -10,6 +10,7 @@
 //! everything that determines a step.
 
 mod bodies;
+mod on_device;
 #[cfg(test)]
 mod patch_tests;
 mod reads;
@@ -22,6 +23,7 @@ use self::bodies::BodyCache;
 use crate::available_memory::available_memory;
 use crate::batch_error::BatchError;
 use crate::capture::CaptureRequest;
+use crate::device::DeviceMirror;
 use crate::drive::table::{DriveState, DriveTable};
 use crate::env::{SimEnv, Stage};
 use crate::row::{EnvRow, StoredRow};
@@ -67,6 +69,8 @@ pub struct Batch {
     running: Mutex<()>,
     /// Growths of buffers in the batches that this one replaces.
     earlier_growths: u64,
+    /// Device that steps the environments; `None` for the threads of this process.
+    device: Option<Mutex<DeviceMirror>>,
 }
 
 /// Working memory for reads while that of all threads is in use.
@@ -205,6 +209,7 @@ impl Batch {
             num_envs,
             running: Mutex::new(()),
             earlier_growths: 0,
+            device: None,
         })
     }
 
@@ -226,6 +231,7 @@ impl Batch {
 
     /// Does `count` MuJoCo steps in every environment. Diverged environments do not step.
     pub fn step(&mut self, count: u32) {
+        let count = self.step_on_device(count, None);
         self.run_chunks(|workspace, taken| taken.for_each_env(workspace, count, |_, env, _| env.advance(count, None)));
     }
 
@@ -238,6 +244,7 @@ impl Batch {
         stage: Stage,
         visit: impl Fn(usize, &SimEnv) + Sync,
     ) {
+        let count = self.step_on_device(count, capture);
         self.run_chunks(|workspace, taken| {
             taken.for_each_env(workspace, count, |i, env, _| {
                 env.advance(count, capture);
@@ -268,6 +275,7 @@ impl Batch {
         read: impl for<'e> Fn(&'e SimEnv) -> [&'e [f64]; K] + Sync,
         mut outs: [&mut [f64]; K],
     ) {
+        let count = self.step_on_device(count, None);
         let widths = self.read_at(0, Stage::Raw, |env| read(env).map(<[f64]>::len));
         for (out, width) in outs.iter().zip(widths) {
             assert!(out.len() == self.num_envs * width, "{} numbers for {} x {width}", out.len(), self.num_envs);
@@ -518,7 +526,7 @@ impl Batch {
     /// Number of times buffers were doubled, in the working memory of all threads. It depends on the number of threads,
     /// and on which of them took an environment.
     pub fn buffer_growths(&self) -> u64 {
-        self.earlier_growths + lock(&self.spare_workspaces).origin.buffer_growths()
+        self.earlier_growths + lock(&self.spare_workspaces).origin.buffer_growths() + self.device_growths()
     }
 
     /// Counts the growths of `old`, which this batch replaces, as growths of this batch.

@@ -37,6 +37,9 @@ pub enum Error {
         /// Index of the environment.
         env: usize,
     },
+    /// The physics of a device is not available, does not support the scene, or failed.
+    #[error(transparent)]
+    Device(#[from] crate::device::DeviceError),
     /// A URDF file, or the assembly of several, is invalid.
     #[error(transparent)]
     Urdf(#[from] UrdfError),

@@ -2,6 +2,7 @@
 
 use crate::batch::Batch;
 use crate::compile::compile;
+use crate::device::{self, DeviceError, DeviceMirror, DevicePhysics, DeviceScene};
 use crate::diverged::DivergedEnv;
 use crate::entity_set::EntitySet;
 use crate::env::{EnvStatus, SimEnv, Stage};
@@ -71,7 +72,10 @@ impl SimulationManager {
         }
         let entities = EntitySet::default();
         let pool = ThreadPool::new();
-        let simulation = compile(&cfg, &entities, &pool)?;
+        let mut simulation = compile(&cfg, &entities, &pool)?;
+        if let Some(physics) = device::open(cfg.device)? {
+            load_on_device(DeviceMirror::new(physics), &cfg, &entities, &mut simulation).map_err(|(error, _)| error)?;
+        }
         let serial = NEXT_MANAGER.fetch_add(1, Ordering::Relaxed);
         let sensors = SensorList::new(serial, cfg.substeps);
         let visuals = VisualCache::default();
@@ -209,6 +213,14 @@ impl SimulationManager {
     /// Compiles `contents` and replaces the simulation. On an error nothing changes.
     pub(crate) fn recompile_with(&mut self, contents: EntitySet, mut diagnostics: Vec<Diagnostic>) -> Result<()> {
         let mut simulation = compile(&self.cfg, &contents, &self.pool)?;
+        simulation.carry_properties(&self.simulation)?;
+        if let Some(device) = self.simulation.batch.take_device()
+            && let Err((error, device)) = load_on_device(device, &self.cfg, &contents, &mut simulation)
+        {
+            // The scene before is still there, and the device needs it again.
+            let restored = load_on_device(device, &self.cfg, &self.entities, &mut self.simulation);
+            return Err(restored.map_or_else(|(error, _)| error, |()| error).into());
+        }
         // Compiling repeats the earlier diagnostics of the robots: report only the new ones.
         let mut known = self.simulation.diagnostics.clone();
         for diagnostic in &simulation.diagnostics {
@@ -217,7 +229,6 @@ impl SimulationManager {
                 None => diagnostics.push(diagnostic.clone()),
             }
         }
-        simulation.carry_properties(&self.simulation)?;
         simulation.transfer_state_from(&self.simulation);
         self.simulation = simulation;
         mj::trim_heap();
@@ -245,6 +256,11 @@ impl SimulationManager {
     {
         let uid = uid.into();
         self.sensors.check(&uid, cfg.requires())?;
+        if self.simulation.batch.is_on_device() && cfg.requires().contains(StateFields::SENSORDATA) {
+            let (what, expected) =
+                (format!("sensor {uid:?}, which reads MuJoCo's own sensors"), "it needs the device cpu");
+            return Err(DeviceError::Unsupported { what, expected: expected.into() }.into());
+        }
         let context = SensorContext { name: uid.as_str().into(), ..self.sensor_context(cfg.requires()) };
         self.sensors.add(uid, cfg, &mut self.simulation, &context)
     }
@@ -489,6 +505,18 @@ impl SimulationManager {
         Ok(())
     }
 
+    /// Error of the physics on a [device](SimulationManagerCfg::device), after which all environments are frozen; always
+    /// `None` on the CPU.
+    pub fn device_failure(&self) -> Option<DeviceError> {
+        self.simulation.batch.device_failure()
+    }
+
+    /// Calls `act` with the physics of the [device](SimulationManagerCfg::device), for code that knows its type; `None` on
+    /// the CPU.
+    pub fn with_device<T>(&self, act: impl FnOnce(&dyn DevicePhysics) -> T) -> Option<T> {
+        self.simulation.batch.with_device(act)
+    }
+
     /// Simulation time of each environment since its last reset \[s\].
     pub fn time(&self) -> Vec<f64> {
         let mut times = Vec::with_capacity(self.num_envs());
@@ -532,3 +560,23 @@ impl SimulationManager {
 /// Largest number of steps in one block: it bounds the response time of the caller (Ctrl+C) and the lead of one
 /// environment over the others.
 const MAX_BLOCK_STEPS: u32 = 1000;
+
+/// Loads a compiled scene on a device, which then steps its environments. On an error, returns the device too.
+#[expect(clippy::result_large_err, reason = "the error returns the device")]
+fn load_on_device(
+    mut device: DeviceMirror,
+    cfg: &SimulationManagerCfg,
+    contents: &EntitySet,
+    simulation: &mut Simulation,
+) -> std::result::Result<(), (DeviceError, DeviceMirror)> {
+    let table = simulation.batch.read_row(0, |row| Arc::clone(row.drives.table()));
+    let loaded =
+        DeviceScene::new(cfg, contents, simulation).and_then(|scene| device.load(&scene, &table, cfg.num_envs));
+    match loaded {
+        Ok(()) => {
+            simulation.batch.set_device(device);
+            Ok(())
+        }
+        Err(error) => Err((error, device)),
+    }
+}

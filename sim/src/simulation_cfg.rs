@@ -1,5 +1,6 @@
 //! Configuration of a simulation: sizes, physics, ground and lights of every environment.
 
+use crate::device::Device;
 use crate::error::{Error, Result};
 use crate::light_cfg::LightCfg;
 use crate::mjcf::document::{FrictionCone, Integrator, PhysicsOption};
@@ -15,6 +16,8 @@ use serde::{Deserialize, Serialize};
 pub struct SimulationManagerCfg {
     /// Number of environments.
     pub num_envs: usize,
+    /// Device of the physics: `cpu`, `cuda`, `cuda:N` with the number of a GPU, or `warp-cpu`.
+    pub device: Device,
     /// Physics time step \[s\]; MuJoCo's time step is `physics_dt / substeps`.
     pub physics_dt: f64,
     /// MuJoCo steps per `physics_dt`.
@@ -73,6 +76,7 @@ impl Default for SimulationManagerCfg {
     fn default() -> Self {
         Self {
             num_envs: 1,
+            device: Device::Cpu,
             physics_dt: 0.01,
             substeps: 1,
             gravity: Vector3::new(0.0, 0.0, -9.81),

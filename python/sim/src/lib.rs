@@ -9,6 +9,7 @@ mod arguments;
 mod calibration;
 mod cfg;
 mod channels;
+mod device;
 mod dynamics;
 mod errors;
 mod html;
@@ -153,6 +154,7 @@ fn _panic(simulation: &Bound<'_, simulation::Simulation>, write: bool) -> PyResu
 
 #[pymodule]
 fn _sim(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    kinetoscope::sim::set_device_opener(device::open);
     module.add_class::<simulation::Simulation>()?;
     module.add_class::<robot::Robot>()?;
     module.add_class::<robot::IkResult>()?;

@@ -2,6 +2,7 @@
 
 use crate::arguments::{array, envs};
 use crate::cfg;
+use crate::device::PythonPhysics;
 use crate::errors::{Class, Failure};
 use crate::objects::{MjcfPart, RigidObject, RigidObjectGroup, Terrain, Weld};
 use crate::robot::Robot;
@@ -190,7 +191,10 @@ impl Simulation {
         let mut block = 1;
         while left > 0 {
             let started = Instant::now();
-            let (now, mut wait) = self.shared.write(py, |sim| Ok(sim.update_without_waiting(block.min(left))))?;
+            let (now, mut wait) = self.shared.write(py, |sim| {
+                let done = sim.update_without_waiting(block.min(left));
+                sim.device_failure().map_or(Ok(done), |error| Err(error.into()))
+            })?;
             left -= now;
             // Outside the lock, so that other threads and signal handlers can use the simulation meanwhile.
             while !wait.is_zero() {
@@ -222,6 +226,20 @@ impl Simulation {
     fn reset_buffers(&self, py: Python<'_>, env_ids: Option<&Bound<'_, PyAny>>) -> PyResult<()> {
         let env_ids = envs(&self.shared, env_ids)?;
         self.shared.write(py, |sim| Ok(sim.scene_mut().reset_buffers(env_ids.as_deref())?))
+    }
+
+    /// An array of the physics on a device, without a copy: a ``warp.array`` with a row per environment, for
+    /// ``warp.to_torch`` and DLPack. Names: ``qpos``, ``qvel``, ``target_position`` and so on. Raises ``DeviceError`` on
+    /// the device ``cpu``.
+    fn device_array(&self, py: Python<'_>, name: &str) -> PyResult<Py<PyAny>> {
+        let object = self.shared.read(py, |sim| {
+            let physics =
+                sim.with_device(|physics| physics.as_any().downcast_ref::<PythonPhysics>().map(PythonPhysics::handle));
+            physics.flatten().ok_or_else(|| {
+                Failure::new(Class::Device, "the device cpu has no arrays of a GPU; use qpos and the like")
+            })
+        })?;
+        object.array(py, name)
     }
 
     /// Number of environments.

@@ -39,7 +39,9 @@ WRITABLE = (*STATE, *INPUTS, "qfrc_applied", *DRIVE_INPUTS, "viscous_damping", *
 # Arrays that `Data` and the kernels keep for the whole life of the environments.
 KEPT = ("qpos", "qvel", "qacc_warmstart", "act", "qacc")
 CAPTURED = (*MOTION, *WRENCHES)
-READABLE = (*KEPT, "effort", "actuator_force", *CAPTURED, "contacts")
+# Results of the last step that stay in `Data`.
+SOLVED = ("actuator_force", "qfrc_actuator", "qfrc_constraint")
+READABLE = (*KEPT, "effort", *SOLVED, *CAPTURED, "contacts")
 # Numbers of an equality constraint in MuJoCo 2.2.2; MuJoCo 4 has one more.
 OLD_EQUALITY_NUMBERS = 11
 
@@ -137,8 +139,8 @@ def read(worlds: Worlds, name: str) -> np.ndarray:
         array = worlds.captured[name]
     elif name == "effort":
         array = worlds.effort
-    elif name == "actuator_force":
-        array = worlds.data.actuator_force
+    elif name in SOLVED:
+        array = getattr(worlds.data, name)
     else:
         array = worlds.kept_arrays[name]
     if array.size == 0:

@@ -54,10 +54,8 @@ class WarpPhysics:
             raise ArgumentError(f"num_envs is {num_envs}; expected 1 or more")
         self._worlds = None
         with wp.ScopedDevice(self._device):
-            worlds = Worlds(load_scene(folder, scene), self._device, num_envs)
-            worlds.graph("forward_once")
-            worlds.graph("step_once")
-        self._worlds = worlds
+            # Kernels are compiled at the first step: a program may add further entities before.
+            self._worlds = Worlds(load_scene(folder, scene), self._device, num_envs)
 
     def write(self, name: str, envs: np.ndarray | None, values: np.ndarray) -> None:
         """Writes rows of the array `name`: those of the environments `envs`, or of all.
