@@ -1,6 +1,11 @@
-"""Simulations on the device "warp-cpu" against the same on the CPU: MuJoCo Warp computes in single precision."""
+"""Simulations on a device against the same on the CPU: MuJoCo Warp computes in single precision.
+
+``KINETOSCOPE_TEST_DEVICE`` names another device than "warp-cpu", such as "cuda:0".
+"""
 
 from __future__ import annotations
+
+import os
 
 import numpy as np
 import pytest
@@ -9,6 +14,8 @@ import kinetoscope as ks
 from kinetoscope.errors import DeviceError
 
 pytestmark = pytest.mark.needs_warp
+
+DEVICE = os.environ.get("KINETOSCOPE_TEST_DEVICE", "warp-cpu")
 
 # Rounding of positions below 4 rad or m to single precision, 2**-22, grows in the motion of a stiff arm: measured 1.0e-6 rad over
 # 4000 steps. Ten times that is the limit.
@@ -26,7 +33,7 @@ def arm(device, num_envs=3, **fields):
 def both(make, act):
     """Results of `act` on both devices."""
     results = []
-    for device in ("cpu", "warp-cpu"):
+    for device in ("cpu", DEVICE):
         sim, *handles = make(device)
         try:
             results.append(act(sim, *handles))
@@ -76,35 +83,39 @@ def test_writes_and_resets():
 
 def test_sensors_of_a_standing_quadruped():
     def make(device):
-        scene = {"simulation": {"num_envs": 2, "device": device, "physics_dt": 0.005, "cone": "elliptic", "impratio": 100.0}}
-        sim = ks.SimulationManager.from_scene({**scene, "entities": {}})
+        cfg = ks.SimulationManagerCfg.legged(num_envs=2, device=device)
+        sim = ks.SimulationManager(cfg)
         robot = sim.add_robot(ks.bundled_robot("quadruped", uid="robot"))
-        contact = sim.add_sensor("feet", ks.ContactSensorCfg(bodies=["robot/.*_FOOT"], sampling=ks.SamplingCfg(update_period=0.005)))
-        imu = sim.add_sensor("imu", ks.ImuCfg(body="robot/base"))
-        scanner = sim.add_sensor("scanner", {"type": "ray_caster", "attach": "robot/base", "pattern": {"grid": {"size": [1.0, 0.6], "resolution": 0.2}}})
+        every_step = ks.SamplingCfg()
+        feet = sim.add_sensor("feet", ks.ContactSensorCfg(bodies=["robot/.*_FOOT"], sampling=every_step))
+        imu = sim.add_sensor("imu", ks.ImuCfg(body="robot/base", sampling=every_step))
+        pattern = ks.RayPattern.grid(ks.GridPattern(resolution=0.2, size=(1.0, 0.6)))
+        scanner = sim.add_sensor("scanner", ks.RayCasterCfg(parent="robot/base", pattern=pattern, sampling=every_step))
         camera = sim.add_sensor("camera", ks.CameraCfg(width=64, height=48))
-        return sim, robot, contact, imu, scanner, camera
+        return sim, robot, feet, imu, scanner, camera
 
-    def act(sim, robot, contact, imu, scanner, camera):
+    def act(sim, robot, feet, imu, scanner, camera):
         sim.update(300)
-        return contact["net_forces"], imu["linear_acceleration"], scanner["hits"], camera["rgb"], robot.total_mass
+        return feet["net_forces_w"], imu["lin_acc_b"], scanner["hits"], camera["rgb"], robot.total_mass
 
     (force, acceleration, hits, image, mass), (force_w, acceleration_w, hits_w, image_w, _) = both(make, act)
-    weight = 9.81 * float(np.max(mass))
-    assert abs(force_w[..., 2].sum(axis=-1) - weight).max() < 1e-3 * weight, "the feet carry the robot"
+    weight = 9.81 * mass
+    # The solver of MuJoCo Warp stops at a residual of single precision: measured 7e-4 N of 511 N.
+    assert np.abs(force_w[..., 2].sum(axis=1) - weight).max() < 1e-4 * weight, "the feet carry the robot"
     assert np.abs(force_w - force).max() < 1e-3 * weight
-    assert np.abs(acceleration_w - acceleration).max() < 0.05
-    assert np.nanmax(np.abs(hits_w - hits)) < 1e-4
+    # 1e-3 of the weight on a leg of a tenth of the mass.
+    assert np.abs(acceleration_w - acceleration).max() < 1e-2 * 9.81
+    assert np.abs(hits_w - hits).max() < POSITION
     assert (np.abs(image.astype(int) - image_w.astype(int)).max(axis=-1) > 8).mean() < 0.01
 
 
 def test_randomized_masses_and_gains():
     def act(sim, robot):
-        terms = [
-            {"property": "mass", "names": ["arm/.*"], "range": [0.8, 1.2], "operation": "scale"},
-            {"property": "stiffness", "names": ["arm/.*"], "range": [0.5, 1.5], "operation": "scale"},
-        ]
-        sim.randomize(ks.Randomization(terms=terms))
+        scale = ks.RandomizationOp.scale
+        sim.randomize([
+            ks.RandomizationTerm(property="mass", pattern="arm/.*", draw=scale([0.8, 1.2])),
+            ks.RandomizationTerm(property="stiffness", pattern="arm/.*", draw=scale([0.1, 1.5])),
+        ])
         robot.set_qpos_target(np.full((3, 6), 0.4))
         sim.update(100)
         return robot.qpos
@@ -115,7 +126,7 @@ def test_randomized_masses_and_gains():
 
 
 def test_snapshots_move_between_devices():
-    sim, robot = arm("warp-cpu")
+    sim, robot = arm(DEVICE)
     robot.set_qpos_target(np.full((3, 6), 0.3))
     sim.update(30)
     snapshot, before = sim.snapshot(), robot.qpos
@@ -126,12 +137,13 @@ def test_snapshots_move_between_devices():
     again = robot.qpos
     sim.restore(snapshot)
     sim.update(30)
-    assert np.array_equal(robot.qpos, again), "the device continues from a snapshot with the same bits"
+    # The order of sums on a GPU, and so the last bits, differ from run to run.
+    assert np.abs(robot.qpos - again).max() <= (0.0 if DEVICE == "warp-cpu" else POSITION)
     sim.destroy()
 
 
 def test_arrays_without_a_copy():
-    sim, robot = arm("warp-cpu")
+    sim, robot = arm(DEVICE)
     robot.set_qpos_target(np.full((3, 6), 0.3))
     sim.update(20)
     array = sim.device_array("qpos")
@@ -159,10 +171,10 @@ def test_refused_simulations(fields, message):
 
 
 def test_refused_welds_leave_the_simulation():
-    sim, robot = arm("warp-cpu")
-    sim.add_rigid_object(uid="cube", shape=ks.ShapeCfg.box(size=(0.1, 0.1, 0.1)) if hasattr(ks, "ShapeCfg") else {"box": {"size": [0.1, 0.1, 0.1]}})
+    sim, robot = arm(DEVICE)
+    sim.add_rigid_object(uid="cube", shape=ks.ObjectShape.box(size=[0.1] * 3))
     with pytest.raises(DeviceError, match=r'cannot simulate the weld "grip"'):
-        sim.add_weld(uid="grip", first="arm/.*", second="cube")
+        sim.add_weld(uid="grip", first="arm/link6", second="cube")
     sim.update(3)
     assert np.isfinite(robot.qpos).all()
     sim.destroy()

@@ -398,6 +398,9 @@ impl DeviceMirror {
         };
         let num_envs = self.patches.len();
         let actuators = forces.len() / num_envs;
+        if forces.len() % num_envs > 0 || table_width(&self.table) > actuators {
+            return Err(DeviceError::Failed(format!("actuator_force has {} numbers", forces.len())));
+        }
         let mut ended = vec![None; num_envs];
         for (env, step, reason) in &report.diverged {
             if let Some(ended) = ended.get_mut(*env) {
@@ -492,6 +495,11 @@ impl DeviceMirror {
         });
         Ok(())
     }
+}
+
+/// Number of controls that drives have.
+fn table_width(table: &DriveTable) -> usize {
+    table.drives.iter().map(|drive| drive.ctrl + 1).max().unwrap_or(0)
 }
 
 /// Makes the next step send the state of an environment.
