@@ -1,7 +1,6 @@
 """Scenes for the tests of physics on a device, and the same physics in MuJoCo's C library as their judge.
 
-The judge works in double precision. Its drive law is written from the equations of `docs` and `sim/src/drive/implicit.rs`, apart from
-the kernels.
+The judge works in double precision. Its drive law follows the equations of `sim/src/drive/implicit.rs`, apart from the kernels.
 """
 
 from __future__ import annotations
@@ -119,6 +118,10 @@ class Judge:
         scene = json.loads(text)
         self.model = mujoco.MjModel.from_xml_path(str(Path(folder) / "scene.xml"))
         model, drives = self.model, scene["drives"]
+        for name, numbers in scene["model"].items():
+            getattr(model, name).flat[:] = numbers
+        mujoco.mj_setConst(model, mujoco.MjData(model))
+        model.opt.timestep = scene["timestep"]
         self.dof, self.qpos, self.ctrl = (np.array([drive[key] for drive in drives], int) for key in ("dof", "qpos", "ctrl"))
         self.stiffness, self.damping = (np.array([drive[key] for drive in drives], float) for key in ("stiffness", "damping"))
         self.max_effort = np.array([UNLIMITED if drive["max_effort"] is None else drive["max_effort"] for drive in drives], float)
