@@ -86,16 +86,16 @@ def drives_of(model):
     return drives
 
 
-def scene_json(model, damped=(), **replaced):
+def scene_json(compiled, damped=(), **replaced):
     """Numbers of a scene, as Kinetoscope writes them, for an exported scene."""
-    drives = drives_of(model)
+    drives = drives_of(compiled)
     names = ("nq", "nv", "nu", "nbody", "ngeom", "neq", "ntendon", "na", "nmocap")
     arrays = ("body_mass", "body_inertia", "body_ipos", "body_iquat", "dof_armature", "dof_damping", "dof_frictionloss")
     scene = {
         "version": 1,
-        "timestep": model.opt.timestep,
-        "sizes": {name: int(getattr(model, name)) for name in names},
-        "model": {name: getattr(model, name).ravel().tolist() for name in arrays},
+        "timestep": compiled.opt.timestep,
+        "sizes": {name: int(getattr(compiled, name)) for name in names},
+        "model": {name: getattr(compiled, name).ravel().tolist() for name in arrays},
         "silent_actuators": [drive["ctrl"] for drive in drives],
         "drives": drives,
         "damped": [list(pair) for pair in damped],
