@@ -10,7 +10,9 @@ from .errors import DeviceError
 
 # Fields of Warp's model and data, and the order of its kernels, change between releases.
 VERSIONS = {"mujoco-warp": "4.0.0", "warp-lang": "1.19.0"}
-COMMAND = "pip install " + " ".join(f'"{name}=={version}"' for name, version in VERSIONS.items())
+# Without the requirements of the packages themselves: no release of `mujoco` allows the `mujoco-core` of this package.
+OTHERS = ("absl-py", "etils", "fsspec", "typing_extensions", "zipp")
+COMMAND = " ".join(["pip install --no-deps", *(f"{name}=={version}" for name, version in VERSIONS.items()), *OTHERS])
 # The export, and the drive rows, are written for this series of MuJoCo.
 MUJOCO = "4.0"
 CPU = "warp-cpu"
