@@ -16,7 +16,7 @@ os.environ["RAY_worker_niceness"] = "0"
 
 def pytest_configure(config):
     config.addinivalue_line("markers", "needs_seeds: needs the tutorials of EmbodiChain and Orbit in KINETOSCOPE_SEEDS")
-    config.addinivalue_line("markers", "needs_warp: needs mujoco-warp and warp-lang, the extra cuda")
+    config.addinivalue_line("markers", "needs_warp: needs mujoco-warp and warp-lang")
     config.addinivalue_line("markers", "needs_learning: needs torch and the libraries of kinetoscope.rl")
 
 

@@ -33,7 +33,7 @@ def strict(tmp_path):
         # Kernels of Warp are functions with a decorator.
         "mypy-kinetoscope.warp.*": "disallow_untyped_decorators = false",
         ",".join(f"mypy-{name}.*" if name == libraries[0] else f"{name}.*" for name in libraries): (
-            "ignore_missing_imports = true\nfollow_imports = skip"
+            "ignore_missing_imports = true\nfollow_imports = skip\nfollow_imports_for_stubs = true"
         ),
     }
     file.write_text("\n".join(f"[{name}]\n{text}" for name, text in sections.items()))

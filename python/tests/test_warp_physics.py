@@ -84,6 +84,24 @@ def test_motion_of_an_arm(name, tmp_path):
     assert (physics.read("qpos") == physics.read("qpos")[0]).all()
 
 
+def test_numbers_of_the_scene(tmp_path):
+    """Numbers that differ from those of the file, and the constants of equalities and limits that follow from them."""
+    model, text = scenes.write_scene(tmp_path, scenes.arm_xml())
+    numbers = json.loads(text)["model"]
+    numbers |= {"body_mass": (1.5 * model.body_mass).tolist(), "dof_armature": [0.2] * 6 + [0.001] * 4}
+    numbers["body_ipos"] = (model.body_ipos + 0.01).ravel().tolist()
+    physics, judge, _ = load(tmp_path, scenes.arm_xml(), model=numbers, timestep=0.005)
+    other, _, _ = load(tmp_path, scenes.arm_xml())
+    judge.target_position = scenes.ARM_TARGET.astype(np.float32).astype(float)
+    for each in (physics, other):
+        each.write("target_position", None, repeat(scenes.ARM_TARGET))
+        step(each, 60)
+    for _ in range(60):
+        judge.step()
+    assert np.abs(physics.read("qpos") - judge.data.qpos).max() < POSITION
+    assert np.abs(other.read("qpos") - judge.data.qpos).max() > 100 * POSITION
+
+
 def test_saturation_and_rest(tmp_path):
     """The drives reach their limits exactly, and the arm settles at its targets, but for the weight that stiffness balances."""
     physics, judge, _ = load(tmp_path, scenes.arm_xml())

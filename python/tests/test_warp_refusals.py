@@ -1,6 +1,7 @@
 """Errors of physics on a device: each names what was wrong, and what would be right."""
 
 import importlib.metadata
+import importlib.util
 import json
 import os
 import subprocess
@@ -14,7 +15,7 @@ import warp_scenes as scenes
 from kinetoscope.errors import ArgumentError, DeviceError, KinetoscopeError, UnknownNameError
 from kinetoscope.warp import UnsupportedSceneError, WarpPhysics, requirements
 
-COMMAND = 'pip install "mujoco-warp==4.0.0" "warp-lang==1.19.0"'
+COMMAND = "pip install --no-deps mujoco-warp==4.0.0 warp-lang==1.19.0 absl-py etils fsspec typing_extensions zipp"
 
 
 # The device, versions of installed packages, and words of the error.
@@ -24,6 +25,8 @@ COMMAND = 'pip install "mujoco-warp==4.0.0" "warp-lang==1.19.0"'
     ("cuda:-1", {}, 'unknown device "cuda:-1"'),
     ("cuda", {"mujoco-warp": None}, f"mujoco-warp 4.0.0, which is not installed; install it with: {COMMAND}"),
     ("warp-cpu", {"mujoco-warp": "4.0.0", "warp-lang": None}, "warp-lang 1.19.0, which is not installed"),
+    ("warp-cpu", {"mujoco-warp": "4.0.0", "warp-lang": "1.19.0", "mujoco": None},
+     'needs mujoco 4.0, which is not installed; install it with: pip install "mujoco==4.0.*"'),
     ("cuda:1", {"mujoco-warp": "4.0.0", "warp-lang": "1.15.0"}, f"warp-lang 1.19.0, but 1.15.0 is installed; install it with: {COMMAND}"),
 ])
 def test_packages(device, installed, words, monkeypatch):
@@ -33,6 +36,8 @@ def test_packages(device, installed, words, monkeypatch):
         return installed[name]
 
     monkeypatch.setattr(importlib.metadata, "version", version)
+    if "mujoco" in installed:
+        monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
     with pytest.raises(DeviceError) as error:
         WarpPhysics(device)
     assert words in str(error.value) and isinstance(error.value, KinetoscopeError)
@@ -55,7 +60,8 @@ def test_without_packages(tmp_path):
     )
     # Without the packages of the environment.
     result = subprocess.run([sys.executable, "-S", "-c", code], capture_output=True, text=True, timeout=60, check=False)
-    assert result.stdout == f"DeviceError physics on a device needs mujoco-warp 4.0.0, which is not installed; install it with: {COMMAND}\n", result.stderr
+    message = f"physics on a device needs mujoco-warp 4.0.0, which is not installed; install it with: {COMMAND}"
+    assert result.stdout == f"DeviceError {message}\n", result.stderr
 
 
 @pytest.mark.needs_warp

@@ -1,7 +1,6 @@
 """Scenes for the tests of physics on a device, and the same physics in MuJoCo's C library as their judge.
 
-The judge works in double precision. Its drive law is written from the equations of `docs` and `sim/src/drive/implicit.rs`, apart from
-the kernels.
+The judge works in double precision. Its drive law follows the equations of `sim/src/drive/implicit.rs`, apart from the kernels.
 """
 
 from __future__ import annotations
@@ -87,16 +86,16 @@ def drives_of(model):
     return drives
 
 
-def scene_json(model, damped=(), **replaced):
+def scene_json(compiled, damped=(), **replaced):
     """Numbers of a scene, as Kinetoscope writes them, for an exported scene."""
-    drives = drives_of(model)
+    drives = drives_of(compiled)
     names = ("nq", "nv", "nu", "nbody", "ngeom", "neq", "ntendon", "na", "nmocap")
     arrays = ("body_mass", "body_inertia", "body_ipos", "body_iquat", "dof_armature", "dof_damping", "dof_frictionloss")
     scene = {
         "version": 1,
-        "timestep": model.opt.timestep,
-        "sizes": {name: int(getattr(model, name)) for name in names},
-        "model": {name: getattr(model, name).ravel().tolist() for name in arrays},
+        "timestep": compiled.opt.timestep,
+        "sizes": {name: int(getattr(compiled, name)) for name in names},
+        "model": {name: getattr(compiled, name).ravel().tolist() for name in arrays},
         "silent_actuators": [drive["ctrl"] for drive in drives],
         "drives": drives,
         "damped": [list(pair) for pair in damped],
@@ -119,6 +118,10 @@ class Judge:
         scene = json.loads(text)
         self.model = mujoco.MjModel.from_xml_path(str(Path(folder) / "scene.xml"))
         model, drives = self.model, scene["drives"]
+        for name, numbers in scene["model"].items():
+            getattr(model, name).flat[:] = numbers
+        mujoco.mj_setConst(model, mujoco.MjData(model))
+        model.opt.timestep = scene["timestep"]
         self.dof, self.qpos, self.ctrl = (np.array([drive[key] for drive in drives], int) for key in ("dof", "qpos", "ctrl"))
         self.stiffness, self.damping = (np.array([drive[key] for drive in drives], float) for key in ("stiffness", "damping"))
         self.max_effort = np.array([UNLIMITED if drive["max_effort"] is None else drive["max_effort"] for drive in drives], float)

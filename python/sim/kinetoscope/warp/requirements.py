@@ -15,6 +15,8 @@ OTHERS = ("absl-py", "etils", "fsspec", "typing_extensions", "zipp")
 COMMAND = " ".join(["pip install --no-deps", *(f"{name}=={version}" for name, version in VERSIONS.items()), *OTHERS])
 # The export, and the drive rows, are written for this series of MuJoCo.
 MUJOCO = "4.0"
+# The package kinetoscope requires `mujoco-core`, which contains it.
+MUJOCO_COMMAND = f'pip install "mujoco=={MUJOCO}.*"'
 CPU = "warp-cpu"
 
 
@@ -29,7 +31,7 @@ def installed_versions() -> dict[str, str]:
         if found[name] != expected:
             raise missing(f"{name} {expected}, but {found[name]} is installed")
     if importlib.util.find_spec("mujoco") is None:
-        raise missing(f"mujoco {MUJOCO}, which is not installed")
+        raise missing(f"mujoco {MUJOCO}, which is not installed", MUJOCO_COMMAND)
     return found
 
 
@@ -54,7 +56,7 @@ def find_device(name: str) -> tuple[Any, dict[str, str]]:
         raise missing(f"packages that can be imported ({error})", f"{COMMAND} --force-reinstall") from error
     versions["mujoco"] = mujoco.__version__
     if not mujoco.__version__.startswith(f"{MUJOCO}."):
-        raise missing(f"mujoco {MUJOCO}, but {mujoco.__version__} is installed", f'pip install "mujoco=={MUJOCO}.*"')
+        raise missing(f"mujoco {MUJOCO}, but {mujoco.__version__} is installed", MUJOCO_COMMAND)
     # Warp prints its devices, and each kernel that it loads.
     wp.config.log_level = max(wp.config.log_level, wp.LOG_WARNING)
     wp.init()
