@@ -72,7 +72,8 @@ REFUSALS = [
     ("scene.xml", "<mujoco", "does not compile"),
     ("start.json", "[]", "start.json is invalid"),
     ("start.json", '{"qpos": []}', "start.json is invalid (KeyError('ctrl')); expected an object with numbers in qpos and ctrl"),
-    ("start.json", '{"qpos": [0], "ctrl": []}', "has 1 numbers in qpos and 0 in ctrl; expected 10 and 8"),
+    ("start.json", '{"qpos": [0], "ctrl": [0, 0, 0, 0, 0, 0, 0, 0]}', "has 1 numbers in qpos and 8 in ctrl; expected 10 and 8"),
+    ("start.json", '{"qpos": [0, 0, 0, 0, 0, 0, 0, 0, 0, 0], "ctrl": []}', "has 10 numbers in qpos and 0 in ctrl; expected 10 and 8"),
 ]
 
 
