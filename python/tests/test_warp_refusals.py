@@ -121,7 +121,7 @@ CALLS = [
     (("write", "qpos", [0, 2], np.zeros((2, 10))), ArgumentError, r"environments from 0 to 1; got \[0, 2\]"),
     (("write", "qpos", [-1], np.zeros((1, 10))), ArgumentError, r"environments from 0 to 1; got \[-1\]"),
     (("write", "eq_data", None, np.zeros((2, 23))), ArgumentError, "eq_data: got 23 numbers for each environment; expected 24"),
-    (("read", "efort"), UnknownNameError, '"efort" cannot be read; expected one of effort'),
+    (("read", "effrt"), UnknownNameError, '"effrt" cannot be read; expected one of effort'),
     (("read", "contacts"), ArgumentError, '"contacts" was not captured; expected a step or solve with the capture "contacts"'),
     (("read", "cvel"), ArgumentError, 'capture "motion"'),
     (("read", "cfrc_int"), ArgumentError, 'capture "wrenches"'),

@@ -45,6 +45,16 @@ struct Chunk {
     read_values: Vec<f64>,
     /// Motion of bodies that was read.
     bodies: BodyCache,
+    /// True if the device has all rows, because none was in use since.
+    is_on_device: bool,
+}
+
+impl Chunk {
+    /// Notes that rows may change.
+    fn expect_changes(&mut self) {
+        self.bodies.expect_changes();
+        self.is_on_device = false;
+    }
 }
 
 /// A chunk that a thread has locked.
@@ -190,7 +200,12 @@ impl Batch {
                 row
             };
             let rows = (0..size).map(row).collect();
-            chunks.push(Mutex::new(Chunk { rows, read_values: Vec::new(), bodies: BodyCache::default() }));
+            chunks.push(Mutex::new(Chunk {
+                rows,
+                read_values: Vec::new(),
+                bodies: BodyCache::default(),
+                is_on_device: false,
+            }));
         }
         let threads = threads.min(count);
         let share = |t: usize| t * count / threads..(t + 1) * count / threads;
@@ -232,7 +247,11 @@ impl Batch {
     /// Does `count` MuJoCo steps in every environment. Diverged environments do not step.
     pub fn step(&mut self, count: u32) {
         let count = self.step_on_device(count, None);
-        self.run_chunks(|workspace, taken| taken.for_each_env(workspace, count, |_, env, _| env.advance(count, None)));
+        if count > 0 {
+            self.run_chunks(|workspace, taken| {
+                taken.for_each_env(workspace, count, |_, env, _| env.advance(count, None));
+            });
+        }
     }
 
     /// Steps as [`step`](Self::step) does, and captures the quantities of `capture` in the last step. Calls `visit` for
@@ -519,7 +538,7 @@ impl Batch {
     fn with_row<T>(&self, index: usize, act: impl FnOnce(&mut Box<EnvRow>) -> T) -> T {
         assert!(index < self.num_envs, "environment {index} of {}", self.num_envs);
         let mut chunk = lock(&self.chunks.chunks[index / self.chunks.chunk_size]);
-        chunk.bodies.expect_changes();
+        chunk.expect_changes();
         act(&mut chunk.rows[index % self.chunks.chunk_size])
     }
 
@@ -538,7 +557,7 @@ impl Batch {
 impl LockedChunk<'_> {
     /// Calls `act` for every row of the chunk, with its index in the chunk.
     fn for_each_row(&mut self, mut act: impl FnMut(usize, &mut Box<EnvRow>)) {
-        self.chunk.bodies.expect_changes();
+        self.chunk.expect_changes();
         self.chunk.rows.iter_mut().enumerate().for_each(|(k, row)| act(k, row));
     }
 
@@ -551,8 +570,8 @@ impl LockedChunk<'_> {
         steps: u32,
         mut act: impl FnMut(usize, &mut SimEnv, &mut Vec<f64>),
     ) {
-        let Chunk { rows, read_values, bodies } = &mut *self.chunk;
-        bodies.expect_changes();
+        self.chunk.expect_changes();
+        let Chunk { rows, read_values, .. } = &mut *self.chunk;
         for k in 0..rows.len() {
             // The next rows are fetched while this environment steps: first the row, then the arrays it points to.
             if let Some(next) = rows.get(k + 1) {

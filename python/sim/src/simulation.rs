@@ -229,8 +229,8 @@ impl Simulation {
     }
 
     /// An array of the physics on a device, without a copy: a ``warp.array`` with a row per environment, for
-    /// ``warp.to_torch`` and DLPack. Names: ``qpos``, ``qvel``, ``target_position`` and so on. Raises ``DeviceError`` on
-    /// the device ``cpu``.
+    /// ``warp.to_torch`` and DLPack. Names: ``qpos``, ``qvel``, ``qacc_warmstart``, ``act`` and ``qacc``. Raises ``DeviceError``
+    /// on the device ``cpu``.
     fn device_array(&self, py: Python<'_>, name: &str) -> PyResult<Py<PyAny>> {
         let object = self.shared.read(py, |sim| {
             let physics =

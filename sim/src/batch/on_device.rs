@@ -2,7 +2,7 @@
 
 use super::{Batch, Lease, lock};
 use crate::capture::CaptureRequest;
-use crate::device::{DeviceError, DeviceMirror, DevicePhysics};
+use crate::device::{DeviceError, DeviceMirror, DevicePhysics, EnvRows};
 use crate::env::Stage;
 use crate::row::EnvRow;
 use std::sync::{Mutex, PoisonError};
@@ -49,19 +49,9 @@ impl Batch {
             // Wrenches in link axes turn with the links, so they are computed again for every step.
             let block = if self.apply_wrenches() { 1 } else { left };
             left -= block;
-            device.step(&self.model, block, capture.filter(|_| left == 0), &|visit| self.visit_rows(visit));
+            device.step(&self.model, block, capture.filter(|_| left == 0), self);
         }
         0
-    }
-
-    /// Calls `visit` for all rows in order, on the calling thread.
-    fn visit_rows(&self, visit: &mut dyn FnMut(usize, &mut EnvRow)) {
-        for (c, chunk) in self.chunks.chunks.iter().enumerate() {
-            let mut chunk = lock(chunk);
-            chunk.bodies.expect_changes();
-            let first = c * self.chunks.chunk_size;
-            chunk.rows.iter_mut().enumerate().for_each(|(k, row)| visit(first + k, row));
-        }
     }
 
     /// Writes wrenches and gravity compensation to the inputs of the rows that have some. Returns true if a wrench turns
@@ -70,7 +60,10 @@ impl Batch {
         let mut turns = false;
         for chunk in &self.chunks.chunks {
             let mut chunk = lock(chunk);
-            chunk.bodies.expect_changes();
+            if chunk.rows.iter().all(|row| row.wrenches.is_none()) {
+                continue;
+            }
+            chunk.expect_changes();
             for row in chunk.rows.iter_mut().filter(|row| row.wrenches.is_some()) {
                 turns |= row.wrenches().has_link_axes();
                 self.with_workspace(row.version, |workspace| {
@@ -81,5 +74,33 @@ impl Batch {
             }
         }
         turns
+    }
+}
+
+impl Batch {
+    /// Calls `visit` for the rows in order, on the calling thread: for all, or for those of changed chunks.
+    fn visit_rows(&self, with_unchanged: bool, visit: &mut dyn FnMut(usize, &mut EnvRow)) {
+        for (c, chunk) in self.chunks.chunks.iter().enumerate() {
+            let mut chunk = lock(chunk);
+            if with_unchanged || !chunk.is_on_device {
+                chunk.expect_changes();
+                let first = c * self.chunks.chunk_size;
+                chunk.rows.iter_mut().enumerate().for_each(|(k, row)| visit(first + k, row));
+            }
+        }
+    }
+}
+
+impl EnvRows for Batch {
+    fn for_each(&self, visit: &mut dyn FnMut(usize, &mut EnvRow)) {
+        self.visit_rows(true, visit);
+    }
+
+    fn for_each_changed(&self, visit: &mut dyn FnMut(usize, &mut EnvRow)) {
+        self.visit_rows(false, visit);
+    }
+
+    fn set_unchanged(&self) {
+        self.chunks.chunks.iter().for_each(|chunk| lock(chunk).is_on_device = true);
     }
 }

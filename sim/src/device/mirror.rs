@@ -160,6 +160,18 @@ struct Sent {
     changed: (Vec<i32>, Vec<f32>),
 }
 
+/// Rows of the environments of a batch.
+pub(crate) trait EnvRows {
+    /// Calls `visit` for all environments in order.
+    fn for_each(&self, visit: &mut dyn FnMut(usize, &mut EnvRow));
+
+    /// Calls `visit` in order for environments that may have changed since [`set_unchanged`](Self::set_unchanged).
+    fn for_each_changed(&self, visit: &mut dyn FnMut(usize, &mut EnvRow));
+
+    /// Notes that the device has all rows.
+    fn set_unchanged(&self);
+}
+
 /// Writes of arrays of the model: environments and their rows, by the name of the array.
 type ModelWrites = BTreeMap<&'static str, (Vec<i32>, Vec<f32>)>;
 
@@ -239,22 +251,16 @@ impl DeviceMirror {
         self.growths
     }
 
-    /// Steps all environments and writes their new states to the rows that `visit` passes. After an error, all
+    /// Steps all environments and writes their new states to the rows in `rows`. After an error, all
     /// environments count as diverged.
-    pub(crate) fn step(
-        &mut self,
-        model: &Model,
-        count: u32,
-        capture: Option<&CaptureRequest>,
-        visit: &dyn Fn(&mut dyn FnMut(usize, &mut EnvRow)),
-    ) {
+    pub(crate) fn step(&mut self, model: &Model, count: u32, capture: Option<&CaptureRequest>, rows: &dyn EnvRows) {
         let done = match &self.failed {
             Some(error) => Err(error.clone()),
-            None => self.try_step(model, count, capture, visit),
+            None => self.try_step(model, count, capture, rows),
         };
         if let Err(error) = done {
             tracing::error!(target: "kinetoscope_sim", %error, "the physics of the device failed");
-            visit(&mut |_, row| {
+            rows.for_each(&mut |_, row| {
                 if row.diverged.is_none() {
                     let reason = Divergence::Engine(EngineError { message: error.to_string() });
                     row.diverged = Some(Box::new(EnvStatus::Diverged { step: row.steps, reason }));
@@ -269,9 +275,9 @@ impl DeviceMirror {
         model: &Model,
         count: u32,
         capture: Option<&CaptureRequest>,
-        visit: &dyn Fn(&mut dyn FnMut(usize, &mut EnvRow)),
+        rows: &dyn EnvRows,
     ) -> Result<(), DeviceError> {
-        self.send(model, visit)?;
+        self.send(model, rows)?;
         let fields = capture.map_or(StateFields::NONE, |capture| capture.fields);
         let wanted: Vec<&str> = [
             (StateFields::CONTACTS, "contacts"),
@@ -288,26 +294,27 @@ impl DeviceMirror {
             self.growths += 1;
             tracing::info!(target: "kinetoscope_sim", rows, contacts, "buffers of the device grew");
         }
-        self.receive(model, count, &report, visit)?;
+        self.receive(model, count, &report, rows)?;
         if let Some(capture) = capture {
-            self.receive_capture(model, capture, visit)?;
+            self.receive_capture(model, capture, rows)?;
         }
+        rows.set_unchanged();
         Ok(())
     }
 
     /// Sends everything that changed in the rows.
-    fn send(&mut self, model: &Model, visit: &dyn Fn(&mut dyn FnMut(usize, &mut EnvRow))) -> Result<(), DeviceError> {
+    fn send(&mut self, model: &Model, rows: &dyn EnvRows) -> Result<(), DeviceError> {
         let num_envs = self.patches.len();
-        let (rows, patches) = (&self.row_drives, &mut self.patches);
+        let (row_drives, patches) = (&self.row_drives, &mut self.patches);
         let sent = &mut self.sent;
         let mut writes = ModelWrites::new();
         let (mut scratch, mut unsupported) = (Vec::new(), None);
-        visit(&mut |env, row| {
+        rows.for_each_changed(&mut |env, row| {
             let row = StoredRow { row, model };
             if sent.is_empty() {
                 for input in Input::ALL {
                     scratch.clear();
-                    input.append(&row, rows, &mut scratch);
+                    input.append(&row, row_drives, &mut scratch);
                     let width = scratch.len();
                     let values = vec![f32::NAN; width * num_envs];
                     sent.push(Sent { input, width, values, changed: Default::default() });
@@ -319,7 +326,7 @@ impl DeviceMirror {
             }
             for array in sent.iter_mut() {
                 scratch.clear();
-                array.input.append(&row, rows, &mut scratch);
+                array.input.append(&row, row_drives, &mut scratch);
                 let mine = &mut array.values[env * array.width..(env + 1) * array.width];
                 if mine.iter().map(|x| x.to_bits()).ne(scratch.iter().map(|x| x.to_bits())) {
                     mine.copy_from_slice(&scratch);
@@ -372,7 +379,7 @@ impl DeviceMirror {
         model: &Model,
         count: u32,
         report: &StepReport,
-        visit: &dyn Fn(&mut dyn FnMut(usize, &mut EnvRow)),
+        rows: &dyn EnvRows,
     ) -> Result<(), DeviceError> {
         let (nv, na) = (model.nv(), model.na());
         for k in 0..self.sent.len() {
@@ -399,7 +406,7 @@ impl DeviceMirror {
         }
         let (sent, table, row_drives) = (&mut self.sent, &self.table, &self.row_drives);
         let mut effort = Vec::new();
-        visit(&mut |env, row| {
+        rows.for_each(&mut |env, row| {
             if row.diverged.is_some() {
                 // The device steps on. The row is sent again once the environment runs.
                 forget(sent, env);
@@ -453,12 +460,12 @@ impl DeviceMirror {
         &mut self,
         model: &Model,
         capture: &CaptureRequest,
-        visit: &dyn Fn(&mut dyn FnMut(usize, &mut EnvRow)),
+        rows: &dyn EnvRows,
     ) -> Result<(), DeviceError> {
         let nbody = model.nbody();
         let contacts = if capture.fields.contains(StateFields::CONTACTS) {
-            let rows = self.physics.read("contacts")?;
-            contacts_by_env(rows.as_chunks::<CONTACT_NUMBERS>().0, self.patches.len())
+            let numbers = self.physics.read("contacts")?;
+            contacts_by_env(numbers.as_chunks::<CONTACT_NUMBERS>().0, self.patches.len())
         } else {
             Vec::new()
         };
@@ -469,7 +476,7 @@ impl DeviceMirror {
             let needed = name != "cfrc_int" || capture.fields.contains(StateFields::JOINT_WRENCHES);
             arrays.push(if needed { self.read(name, width * nbody)? } else { Vec::new() });
         }
-        visit(&mut |env, row| {
+        rows.for_each(&mut |env, row| {
             if row.diverged.is_some() {
                 return;
             }

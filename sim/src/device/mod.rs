@@ -16,7 +16,7 @@ mod scene;
 mod tests;
 mod worker;
 
-pub(crate) use mirror::DeviceMirror;
+pub(crate) use mirror::{DeviceMirror, EnvRows};
 pub(crate) use scene::DeviceScene;
 
 use serde::{Deserialize, Serialize};

@@ -47,7 +47,7 @@ def apply_inputs(
     friction_rows: wp.array[int],
     limit_rows: wp.array[int],
     step_index: wp.array[int],
-):
+) -> None:
     """Writes the forces on all degrees of freedom, and the friction rows of drives: the law of `sim/src/drive/implicit.rs`."""
     w, dof = wp.tid()
     if w == 0 and dof == 0:
@@ -101,7 +101,7 @@ def read_efforts(
     bad: wp.array[int],
     # outputs
     effort: wp.array2d[float],
-):
+) -> None:
     """Stores the efforts of drives; those of a diverged environment stay as they are."""
     w, drive = wp.tid()
     if bad[w] != 0:
@@ -134,7 +134,7 @@ def check_state(
     peak_rows: wp.array[int],
     peak_contacts: wp.array[int],
     first_overflow: wp.array[int],
-):
+) -> None:
     """Marks environments with a number that is not finite or too large, and keeps the largest numbers of rows and contacts."""
     w, i = wp.tid()
     if i == 0:
@@ -180,7 +180,7 @@ def settle_state(
     warmstart: wp.array2d[float],
     act: wp.array2d[float],
     qacc: wp.array2d[float],
-):
+) -> None:
     """Keeps the state of each environment; gives a diverged one the kept state back, and freezes it."""
     w, i = wp.tid()
     is_bad = bad[w] != 0
@@ -222,7 +222,7 @@ def restore_state(
     qvel: wp.array2d[float],
     warmstart: wp.array2d[float],
     act: wp.array2d[float],
-):
+) -> None:
     """Gives all environments the kept state back."""
     w, i = wp.tid()
     if i == 0 and frozen[w] == 0:
@@ -255,7 +255,7 @@ def summarize(
     diverged_step: wp.array[int],
     # outputs
     summary: wp.array[int],
-):
+) -> None:
     """Reduces the flags of all environments to a few numbers, so that a block of steps needs one small copy to the host."""
     w = wp.tid()
     bits = overflow[w]
@@ -272,21 +272,21 @@ def summarize(
 
 
 @wp.kernel(enable_backward=False)
-def write_rows(envs: wp.array[int], values: wp.array2d[float], target: wp.array2d[float]):
+def write_rows(envs: wp.array[int], values: wp.array2d[float], target: wp.array2d[float]) -> None:
     """Copies rows of `values` to the environments `envs`."""
     k, i = wp.tid()
     target[envs[k], i] = values[k, i]
 
 
 @wp.kernel(enable_backward=False)
-def write_flags(envs: wp.array[int], values: wp.array2d[float], target: wp.array2d[wp.bool]):
+def write_flags(envs: wp.array[int], values: wp.array2d[float], target: wp.array2d[wp.bool]) -> None:
     """Copies rows of flags, 0 or 1, to the environments `envs`."""
     k, i = wp.tid()
     target[envs[k], i] = values[k, i] != 0.0
 
 
 @wp.kernel(enable_backward=False)
-def unfreeze(envs: wp.array[int], frozen: wp.array[int], bad: wp.array[int]):
+def unfreeze(envs: wp.array[int], frozen: wp.array[int], bad: wp.array[int]) -> None:
     """Lets environments step again."""
     k = wp.tid()
     frozen[envs[k]] = 0
@@ -311,7 +311,7 @@ def place_static_geoms(
     # outputs
     geom_xpos: wp.array2d[wp.vec3],
     geom_xmat: wp.array2d[wp.mat33],
-):
+) -> None:
     """Moves geoms of bodies without degrees of freedom, which Warp places only once, to the poses of their bodies."""
     w, i = wp.tid()
     geom = static_geoms[i]
@@ -340,7 +340,7 @@ def gather_contacts(
     # outputs
     used: wp.array[int],
     rows: wp.array2d[float],
-):
+) -> None:
     """Collects the contacts with constraint rows; the last column is the number of the contact within its pair."""
     c = wp.tid()
     if c >= count[0]:

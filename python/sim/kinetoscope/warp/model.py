@@ -94,7 +94,7 @@ def load_scene(folder: str, text: str) -> Scene:
 def read_numbers(text: str) -> dict[str, Any]:
     """Fields of the JSON of a scene. Raises DeviceError for other JSON, and for another version."""
     try:
-        scene = json.loads(text)
+        scene: Any = json.loads(text)
     except ValueError as error:
         raise DeviceError(f"the numbers of the scene are not JSON: {error}") from error
     version = scene.get("version") if isinstance(scene, dict) else None
@@ -103,7 +103,7 @@ def read_numbers(text: str) -> dict[str, Any]:
     missing = [name for name in FIELDS if name not in scene]
     if missing:
         raise DeviceError(f"the numbers of the scene have no field {missing[0]}; expected {', '.join(FIELDS)}")
-    return scene
+    return dict(scene)
 
 
 def check_sizes(model: Any, sizes: dict[str, int]) -> None:
@@ -123,7 +123,8 @@ def replace_numbers(model: Any, arrays: dict[str, list[float]]) -> None:
             raise DeviceError(f'the scene replaces the array "{name}" of the model; expected one of {", ".join(REPLACED)}')
         target = getattr(model, name)
         if len(numbers) != target.size:
-            raise DeviceError(f"the scene compiles differently in MuJoCo 4: {name} has {target.size} numbers; expected {len(numbers)}")
+            sizes = f"{name} has {target.size} numbers; expected {len(numbers)}"
+            raise DeviceError(f"the scene compiles differently in MuJoCo 4: {sizes}")
         target[:] = np.array(numbers, dtype=float).reshape(target.shape)
     mujoco.mj_setConst(model, mujoco.MjData(model))
 
@@ -140,7 +141,8 @@ def check_indices(model: Any, drives: list[dict[str, Any]], damped: np.ndarray, 
     owners: dict[int, str] = {}
     for drive in drives:
         if drive["dof"] in owners:
-            raise DeviceError(f'the drives "{owners[drive["dof"]]}" and "{drive["name"]}" have the same degree of freedom {drive["dof"]}')
+            both = f'"{owners[drive["dof"]]}" and "{drive["name"]}"'
+            raise DeviceError(f"the drives {both} have the same degree of freedom {drive['dof']}")
         owners[drive["dof"]] = drive["name"]
 
 

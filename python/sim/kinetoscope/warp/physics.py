@@ -43,8 +43,8 @@ class WarpPhysics:
     def load(self, folder: str, scene: str, num_envs: int) -> None:
         """Loads `scene.xml` of `folder` with the numbers of `scene`, JSON, into `num_envs` environments.
 
-        Replaces a scene that was loaded before, also if it raises. Raises UnsupportedSceneError for a scene that MuJoCo Warp does not support, and
-        DeviceError for one that does not fit into the memory of the device.
+        Replaces a scene that was loaded before, also if it raises. Raises UnsupportedSceneError for a scene that MuJoCo Warp does
+        not support, and DeviceError for one that does not fit into the memory of the device.
         """
         import warp as wp
 
@@ -172,7 +172,13 @@ class WarpPhysics:
         return tuple(name for name in CAPTURES if name in capture)
 
     def _run(
-        self, worlds: Worlds, operation: str, count: int, wanted: tuple[str, ...], grown: list[tuple[int, int]], warnings: dict[str, int]
+        self,
+        worlds: Worlds,
+        operation: str,
+        count: int,
+        wanted: tuple[str, ...],
+        grown: list[tuple[int, int]],
+        warnings: dict[str, int],
     ) -> int:
         """Runs a block until all arrays were large enough. Returns the number of environments that diverged in this call."""
         from .worlds import SIZE_BITS

@@ -27,10 +27,9 @@ CONTACT_COLUMNS = 20
 # Later than every step.
 NO_STEP = 2**31 - 1
 
-SIZE_BITS = int(
-    mjw.OverflowType.NEFC | mjw.OverflowType.NJMAX_NNZ | mjw.OverflowType.BROADPHASE | mjw.OverflowType.NARROWPHASE | mjw.OverflowType.CCD
-)
 ROW_BITS = int(mjw.OverflowType.NEFC | mjw.OverflowType.NJMAX_NNZ)
+CONTACT_BITS = int(mjw.OverflowType.BROADPHASE | mjw.OverflowType.NARROWPHASE | mjw.OverflowType.CCD)
+SIZE_BITS = ROW_BITS | CONTACT_BITS
 REASONS = ((4, "qacc"), (2, "qvel"), (1, "qpos"))
 
 
@@ -100,8 +99,8 @@ class Worlds:
             return mjw.make_data(self.scene.model, nworld=self.num_envs, njmax=rows, nconmax=contacts)
         except (RuntimeError, MemoryError) as error:
             raise DeviceError(
-                f"the device {self.device.alias} has not enough memory for {self.num_envs} environments with up to {contacts} contacts "
-                f"and {rows} constraint rows each ({error}); expected fewer environments, or fewer contacts in each"
+                f"the device {self.device.alias} has not enough memory for {self.num_envs} environments with up to {contacts} "
+                f"contacts and {rows} constraint rows each ({error}); expected fewer environments, or fewer contacts in each"
             ) from error
 
     def block_arrays(self) -> list[wp.array]:
@@ -121,7 +120,9 @@ class Worlds:
                 *(self.drives[name] for name in DRIVE_INPUTS),
                 self.viscous_damping, self.user_force, d.qpos, d.qvel, d.dof_frictionadr, self.frozen,
             ],
-            outputs=[d.ctrl, d.qfrc_applied, rows.D, rows.aref, rows.frictionloss, d.nefc, d.ne, d.nf, d.nl, self.step_index],
+            outputs=[
+                d.ctrl, d.qfrc_applied, rows.D, rows.aref, rows.frictionloss, d.nefc, d.ne, d.nf, d.nl, self.step_index,
+            ],
         )
 
     def check(self) -> None:
@@ -130,7 +131,10 @@ class Worlds:
         wp.launch(
             kernels.check_state,
             dim=(self.num_envs, self.nq + 2 * self.nv),
-            inputs=[self.nq, self.nv, d.qpos, d.qvel, d.qacc, self.frozen, d.nefc, d.nacon, d.ncollision, d.overflow, SIZE_BITS, self.step_index],
+            inputs=[
+                self.nq, self.nv, d.qpos, d.qvel, d.qacc, self.frozen, d.nefc, d.nacon, d.ncollision, d.overflow, SIZE_BITS,
+                self.step_index,
+            ],
             outputs=[self.bad, self.peak_rows, self.peak_contacts, self.first_overflow],
         )
 
@@ -162,7 +166,7 @@ class Worlds:
             kernels.read_efforts,
             dim=self.effort.shape,
             inputs=[
-                self.drive_dof, self.drives["stiffness"], self.drives["damping"], self.drives["max_effort"], self.drives["feedforward"],
+                self.drive_dof, *(self.drives[name] for name in ("stiffness", "damping", "max_effort", "feedforward")),
                 self.data.dof_frictionadr, self.data.efc.force, self.bad,
             ],
             outputs=[self.effort],
@@ -182,7 +186,8 @@ class Worlds:
                 kernels.gather_contacts,
                 dim=d.naconmax,
                 inputs=[
-                    d.nacon, c.worldid, c.geom, c.dist, c.pos, c.frame, c.efc_address, c.geomcollisionid, self.captured["forces"], self.bad,
+                    d.nacon, c.worldid, c.geom, c.dist, c.pos, c.frame, c.efc_address, c.geomcollisionid, self.captured["forces"],
+                    self.bad,
                 ],
                 outputs=[self.captured["used"], self.captured["contacts"]],
             )
@@ -261,7 +266,9 @@ class Worlds:
 
     def run(self, operation: str, count: int, wanted: tuple[str, ...] = ()) -> Summary:
         """Runs `count` operations from a forward pass, the last one with the capture `wanted`."""
+        self.forward()
         graphs = [self.graph(operation)] * (count - 1) + [self.graph(operation, wanted)]
+        # Recording a graph changed what the forward pass computed.
         self.forward()
         self.keep_block()
         self.data.overflow.zero_()
@@ -303,12 +310,15 @@ class Worlds:
         self.is_forward_needed = True
 
     def grow(self, summary: Summary) -> None:
-        """Enlarges the arrays that were too small, and returns to the start of the block. Raises DeviceError without enough memory."""
+        """Enlarges the arrays that were too small, and returns to the start of the block.
+
+        Raises DeviceError without enough memory.
+        """
         self.restore_block()
         rows, contacts = self.rows, self.contacts
         if summary.overflow & ROW_BITS:
             rows = sizes.enlarged(rows, summary.rows)
-        if summary.overflow & SIZE_BITS & ~ROW_BITS:
+        if summary.overflow & CONTACT_BITS:
             contacts = sizes.enlarged(contacts, math.ceil(summary.contacts / self.num_envs))
         sizes.check_memory(self.data, self.device, rows, contacts)
         self.resize(rows, contacts)

@@ -119,6 +119,7 @@ class InteractiveScene(Layer):
                 lights.append(native.LightCfg(color=tuple(strength * c for c in colors(light.color))))
         return native.SimulationManagerCfg.legged(
             num_envs=self.cfg.num_envs,
+            device=str(context.cfg.device),
             arena_space=float(self.cfg.env_spacing),
             physics_dt=float(context.cfg.dt),
             gravity=tuple(float(x) for x in context.cfg.gravity),

@@ -68,8 +68,6 @@ class SimulationManager(Layer):
         unsupported(
             "SimulationManagerCfg", profiler=self.cfg.profiler is not None, visualization=self.cfg.visualization is not None
         )
-        if str(self.cfg.sim_device).startswith("cuda"):
-            raise ConfigError("sim_device is 'cuda': this package simulates on the CPU; use 'cpu'")
         self._steps = 0
         self._lights: list[native.LightCfg] = []
         self._assets: dict[str, Any] = {}
@@ -80,6 +78,7 @@ class SimulationManager(Layer):
         lights = {"lights": self._lights} if self._lights else {}
         return NativeSimulationManager(
             num_envs=self.cfg.num_envs,
+            device=str(self.cfg.sim_device),
             physics_dt=self.cfg.physics_dt,
             arena_space=self.cfg.arena_space,
             gravity=tuple(float(x) for x in array(self.cfg.physics_config.gravity)),
