@@ -100,7 +100,7 @@ pub(crate) fn run(args: &Args) -> Result<CommandStatus> {
     while !interrupted.load(Ordering::SeqCst) && args.steps.is_none_or(|steps| step < steps) && closed().is_none() {
         sim.update(1);
         step += 1;
-        if sim.device_failure().is_some() {
+        if sim.scene().device_failure().is_some() {
             break;
         }
     }
@@ -114,7 +114,7 @@ pub(crate) fn run(args: &Args) -> Result<CommandStatus> {
     if let Some(reason) = closed().as_ref().and_then(Closed::error) {
         return Err(format!("the window was lost after {step} steps: {reason}").into());
     }
-    if let Some(error) = sim.device_failure() {
+    if let Some(error) = sim.scene().device_failure() {
         return Err(error.into());
     }
     let diverged = sim.diverged();

@@ -26,7 +26,7 @@ COMMAND = "pip install --no-deps mujoco-warp==4.0.0 warp-lang==1.19.0 absl-py et
     ("cuda", {"mujoco-warp": None}, f"mujoco-warp 4.0.0, which is not installed; install it with: {COMMAND}"),
     ("warp-cpu", {"mujoco-warp": "4.0.0", "warp-lang": None}, "warp-lang 1.19.0, which is not installed"),
     ("warp-cpu", {"mujoco-warp": "4.0.0", "warp-lang": "1.19.0", "mujoco": None},
-     'needs mujoco 4.0, which is not installed; install it with: pip install "mujoco==4.0.*"'),
+     'needs mujoco 4.0, which is not installed; install it with: pip install "mujoco-core==4.0.*"'),
     ("cuda:1", {"mujoco-warp": "4.0.0", "warp-lang": "1.15.0"}, f"warp-lang 1.19.0, but 1.15.0 is installed; install it with: {COMMAND}"),
 ])
 def test_packages(device, installed, words, monkeypatch):

@@ -92,7 +92,7 @@ def test_a_killed_worker_is_an_error(tmp_path):
     ("variables", "message"),
     [
         ({"KINETOSCOPE_PYTHON": "/nonexistent/python"}, "/nonexistent/python does not start"),
-        ({"KINETOSCOPE_PYTHON": "false"}, "false -m pip install"),
+        ({"KINETOSCOPE_PYTHON": "false"}, "it needs the Python package kinetoscope"),
     ],
 )
 def test_missing_python(variables, message, tmp_path):

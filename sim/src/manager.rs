@@ -2,7 +2,7 @@
 
 use crate::batch::Batch;
 use crate::compile::compile;
-use crate::device::{self, DeviceError, DeviceMirror, DevicePhysics, DeviceScene};
+use crate::device::{self, DeviceError, DeviceMirror, DeviceScene};
 use crate::diverged::DivergedEnv;
 use crate::entity_set::EntitySet;
 use crate::env::{EnvStatus, SimEnv, Stage};
@@ -503,18 +503,6 @@ impl SimulationManager {
             self.sensors.reset(&envs, &mut self.simulation);
         }
         Ok(())
-    }
-
-    /// Error of the physics on a [device](SimulationManagerCfg::device), after which all environments are frozen; always
-    /// `None` on the CPU.
-    pub fn device_failure(&self) -> Option<DeviceError> {
-        self.simulation.batch.device_failure()
-    }
-
-    /// Calls `act` with the physics of the [device](SimulationManagerCfg::device), for code that knows its type; `None` on
-    /// the CPU.
-    pub fn with_device<T>(&self, act: impl FnOnce(&dyn DevicePhysics) -> T) -> Option<T> {
-        self.simulation.batch.with_device(act)
     }
 
     /// Simulation time of each environment since its last reset \[s\].

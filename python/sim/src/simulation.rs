@@ -193,7 +193,7 @@ impl Simulation {
             let started = Instant::now();
             let (now, mut wait) = self.shared.write(py, |sim| {
                 let done = sim.update_without_waiting(block.min(left));
-                sim.device_failure().map_or(Ok(done), |error| Err(error.into()))
+                sim.scene().device_failure().map_or(Ok(done), |error| Err(error.into()))
             })?;
             left -= now;
             // Outside the lock, so that other threads and signal handlers can use the simulation meanwhile.
@@ -233,8 +233,9 @@ impl Simulation {
     /// on the device ``cpu``.
     fn device_array(&self, py: Python<'_>, name: &str) -> PyResult<Py<PyAny>> {
         let object = self.shared.read(py, |sim| {
-            let physics =
-                sim.with_device(|physics| physics.as_any().downcast_ref::<PythonPhysics>().map(PythonPhysics::handle));
+            let physics = sim
+                .scene()
+                .with_device(|physics| physics.as_any().downcast_ref::<PythonPhysics>().map(PythonPhysics::handle));
             physics.flatten().ok_or_else(|| {
                 Failure::new(Class::Device, "the device cpu has no arrays of a GPU; use qpos and the like")
             })

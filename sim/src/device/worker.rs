@@ -172,7 +172,7 @@ mod tests {
     fn refusals() {
         for (python, message) in [
             ("/nonexistent/python", "/nonexistent/python does not start: No such file or directory"),
-            ("false", "the worker process ended (exit status: 1); it needs the Python package: false -m pip install"),
+            ("false", "the worker process ended (exit status: 1); it needs the Python package kinetoscope"),
         ] {
             let error = Worker::start_with(Device::WarpCpu, &python.into()).expect_err("no worker").to_string();
             assert!(error.starts_with(&format!("--device warp-cpu: {message}")), "{error}");

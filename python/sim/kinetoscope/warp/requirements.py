@@ -16,7 +16,7 @@ COMMAND = " ".join(["pip install --no-deps", *(f"{name}=={version}" for name, ve
 # The export, and the drive rows, are written for this series of MuJoCo.
 MUJOCO = "4.0"
 # The package kinetoscope requires `mujoco-core`, which contains it.
-MUJOCO_COMMAND = f'pip install "mujoco=={MUJOCO}.*"'
+MUJOCO_COMMAND = f'pip install "mujoco-core=={MUJOCO}.*"'
 CPU = "warp-cpu"
 
 
