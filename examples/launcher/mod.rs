@@ -135,7 +135,7 @@ impl CompatibilityFlags {
     fn notes(&self) -> Vec<String> {
         let cameras = "cameras render on the CPU, with or without a window";
         let flags = [
-            (self.gpu_id.is_some(), "--gpu-id", "physics and cameras run on the CPU; --threads chooses how many cores"),
+            (self.gpu_id.is_some(), "--gpu-id", "--device cuda:N chooses the GPU of the physics, and cameras run on the CPU"),
             (self.enable_cameras, "--enable-cameras", cameras),
             (self.offscreen_render, "--offscreen-render", cameras),
         ];
