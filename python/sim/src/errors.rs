@@ -6,7 +6,7 @@ use kinetoscope::robot::dynamics::DynamicsError;
 use kinetoscope::sensors::SensorError;
 use kinetoscope::sim::Error;
 use kinetoscope::sim::inspect::InspectError;
-use kinetoscope::viewer::{ScreenshotError, ServeError, WindowError};
+use kinetoscope::viewer::{PlayError, ScreenshotError, ServeError, WindowError};
 use pyo3::prelude::*;
 use std::any::Any;
 
@@ -186,6 +186,7 @@ macro_rules! classes {
 
 classes! {
     RecordError => Recording,
+    PlayError => Recording,
     ServeError => Viewer,
     WindowError => Viewer,
     ScreenshotError => Viewer,
