@@ -173,9 +173,8 @@ fn interrupted() {
     assert!(matches!(stopped, Err(Error::Interrupted)), "{stopped:?}");
     assert_eq!((sim.update_until(&set, 50), all_bits(&sim)), (0, before));
     // Set by another thread in the middle of steps that would take days.
+    let flag = &AtomicBool::new(false);
     let (steps, late) = std::thread::scope(|scope| {
-        let flag = AtomicBool::new(false);
-        let flag = &flag;
         let setter = scope.spawn(move || {
             std::thread::sleep(Duration::from_millis(200));
             flag.store(true, Ordering::Relaxed);
