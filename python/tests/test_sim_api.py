@@ -163,8 +163,6 @@ RENAMED = {
     "SimulationManager.articulation": "__getitem__",
     "SimulationManager.new": "__new__",
     "SimulationManager.robot": "__getitem__",
-    "SimulationManager.rollout_until": "rollout",
-    "SimulationManager.update_until": "update",
     "Env.step_until": "step",
     "Snapshot.is_empty": "__len__",
     "Snapshot.len": "__len__",

@@ -442,22 +442,6 @@ impl SimulationManager {
         }
     }
 
-    /// [`update`](Self::update) that another thread can end by setting `stop`. Returns the number of steps done: all of
-    /// them, or fewer if the flag was set. It is read before blocks of steps, each of about 50 ms or one step.
-    pub fn update_until(&mut self, stop: &AtomicBool, steps: u32) -> u32 {
-        const LONGEST_BLOCK: f64 = 0.05;
-        let (mut done, mut block) = (0, 1);
-        while done < steps && !stop.load(Ordering::Relaxed) {
-            let (started, now) = (Instant::now(), block.min(steps - done));
-            self.update(now);
-            done += now;
-            // At most twice as many steps as before, so that one fast block does not lead to a long one.
-            let per_step = started.elapsed().as_secs_f64() / f64::from(now);
-            block = ((LONGEST_BLOCK / per_step.max(1e-9)) as u32).clamp(1, block.saturating_mul(2));
-        }
-        done
-    }
-
     /// Does `steps` physics steps and updates the sensors; does not notify observers.
     fn advance(&mut self, steps: u32) {
         let mut left = steps;
@@ -549,3 +533,19 @@ impl SimulationManager {
 /// Largest number of steps in one block: it bounds the response time of the caller (Ctrl+C) and the lead of one
 /// environment over the others.
 const MAX_BLOCK_STEPS: u32 = 1000;
+
+/// [Steps](SimulationManager::update) all environments until another thread sets `stop`. Returns the number of steps done:
+/// all of them, or fewer if the flag was set. It is read before blocks of steps, each of about 50 ms or one step.
+pub fn update_until(sim: &mut SimulationManager, stop: &AtomicBool, steps: u32) -> u32 {
+    const LONGEST_BLOCK: f64 = 0.05;
+    let (mut done, mut block) = (0, 1);
+    while done < steps && !stop.load(Ordering::Relaxed) {
+        let (started, now) = (Instant::now(), block.min(steps - done));
+        sim.update(now);
+        done += now;
+        // At most twice as many steps as before, so that one fast block does not lead to a long one.
+        let per_step = started.elapsed().as_secs_f64() / f64::from(now);
+        block = ((LONGEST_BLOCK / per_step.max(1e-9)) as u32).clamp(1, block.saturating_mul(2));
+    }
+    done
+}

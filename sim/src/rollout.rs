@@ -115,6 +115,20 @@ fn step_row(
     Some((EnvEntry { env: row.env, state: env.save_state(), overrides: Arc::default() }, reason))
 }
 
+/// [Rollout](SimulationManager::rollout) that another thread can end by setting `stop`, after the steps that are running.
+///
+/// # Errors
+/// Same as [`SimulationManager::rollout`], and [`Error::Interrupted`] if `stop` was set before the last step.
+pub fn rollout_until<'c>(
+    sim: &SimulationManager,
+    stop: &AtomicBool,
+    controls: impl AsArray<'c, f64, Ix3>,
+    start: Option<&Snapshot>,
+    env_ids: Option<&[EnvId]>,
+) -> Result<Rollout> {
+    sim.run_rollout(stop, controls.into(), start, env_ids)
+}
+
 impl SimulationManager {
     /// Simulates copies of environments under `controls`, shape (N, T, C): N rows with the controls of T physics steps.
     /// [`control_names`](crate::Entities::control_names) has the names of the C columns.
@@ -141,21 +155,16 @@ impl SimulationManager {
         start: Option<&Snapshot>,
         env_ids: Option<&[EnvId]>,
     ) -> Result<Rollout> {
-        self.rollout_until(&AtomicBool::new(false), controls, start, env_ids)
+        self.run_rollout(&AtomicBool::new(false), controls.into(), start, env_ids)
     }
 
-    /// [`rollout`](Self::rollout) that another thread can end by setting `stop`, after the steps that are running.
-    ///
-    /// # Errors
-    /// Same as [`rollout`](Self::rollout), and [`Error::Interrupted`] if `stop` was set before the last step.
-    pub fn rollout_until<'c>(
+    fn run_rollout(
         &self,
         stop: &AtomicBool,
-        controls: impl AsArray<'c, f64, Ix3>,
+        controls: ArrayView3<'_, f64>,
         start: Option<&Snapshot>,
         env_ids: Option<&[EnvId]>,
     ) -> Result<Rollout> {
-        let controls: ArrayView3<'_, f64> = controls.into();
         let envs = env_list(env_ids, self.num_envs())?;
         let columns = columns(&self.simulation);
         self.check_controls(controls, envs.len(), columns.len())?;

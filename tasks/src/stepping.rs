@@ -7,7 +7,7 @@ use crate::episode_rng::{EpisodeKey, EpisodeRng};
 use crate::error::{EnvError, Result};
 use crate::event::EventMode;
 use crate::step::{EndReason, EndedEpisode, Step, StepInfo};
-use kinetoscope_sim::{EnvId, Error, StepResult};
+use kinetoscope_sim::{EnvId, Error, StepResult, update_until};
 use ndarray::{Array1, Array2, ArrayView2, AsArray, Axis, Ix2, Slice};
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -159,7 +159,7 @@ impl Env {
             }
         } else if let Some(stop) = stop {
             // In blocks, which cost more than one call for all steps.
-            if present.sim_mut().update_until(stop, self.cfg.decimation) < self.cfg.decimation {
+            if update_until(present.sim_mut(), stop, self.cfg.decimation) < self.cfg.decimation {
                 return Err(Error::Interrupted.into());
             }
         } else {

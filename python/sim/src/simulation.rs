@@ -13,7 +13,7 @@ use kinetoscope::prelude::{ArticulationCfg, MjcfPartCfg, RigidObjectCfg, RobotCf
 use kinetoscope::robot::diagnostic::Diagnostic;
 use kinetoscope::sim::{
     EntityCfg, EntityTypes, EnvId, InteractiveScene, Property, Randomization, RigidObjectGroupCfg, SimulationManager,
-    WeldCfg,
+    WeldCfg, rollout_until,
 };
 use kinetoscope::viewer::ViewerExt as _;
 use numpy::{IntoPyArray, PyArray1};
@@ -406,7 +406,7 @@ impl Simulation {
         let (controls, env_ids) = (array::<Ix3>(controls, "rollout, controls")?, envs(&self.shared, env_ids)?);
         let start = start.map(|start| &start.get().inner);
         let rollout = interruptible(py, |stop| {
-            self.shared.read_detached(|sim| Ok(sim.rollout_until(stop, &controls, start, env_ids.as_deref())?))
+            self.shared.read_detached(|sim| Ok(rollout_until(sim, stop, &controls, start, env_ids.as_deref())?))
         })?;
         let final_states = Snapshot { inner: rollout.final_states };
         Ok((rollout.states.into_pyarray(py).into_any(), final_states, rollout.diverged))

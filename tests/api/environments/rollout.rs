@@ -3,7 +3,7 @@
 use super::worlds::{ALL, Ids, all_bits, cfg, world};
 use kinetoscope::ndarray::{Array2, Array3, Axis, concatenate, s};
 use kinetoscope::prelude::*;
-use kinetoscope::sim::Error;
+use kinetoscope::sim::{Error, rollout_until, update_until};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
@@ -169,9 +169,9 @@ fn interrupted() {
     let (mut sim, _) = world(cfg(3, 2));
     let (set, unset) = (AtomicBool::new(true), AtomicBool::new(false));
     let (controls, before) = (controls(3), all_bits(&sim));
-    let stopped = sim.rollout_until(&set, &controls, None, ALL);
+    let stopped = rollout_until(&sim, &set, &controls, None, ALL);
     assert!(matches!(stopped, Err(Error::Interrupted)), "{stopped:?}");
-    assert_eq!((sim.update_until(&set, 50), all_bits(&sim)), (0, before));
+    assert_eq!((update_until(&mut sim, &set, 50), all_bits(&sim)), (0, before));
     // Set by another thread in the middle of steps that would take days.
     let flag = &AtomicBool::new(false);
     let (steps, late) = std::thread::scope(|scope| {
@@ -180,7 +180,7 @@ fn interrupted() {
             flag.store(true, Ordering::Relaxed);
             Instant::now()
         });
-        let steps = sim.update_until(flag, u32::MAX);
+        let steps = update_until(&mut sim, flag, u32::MAX);
         let late = Instant::now().saturating_duration_since(setter.join().unwrap());
         (steps, late)
     });
@@ -189,10 +189,10 @@ fn interrupted() {
     other.update(steps);
     assert_eq!(all_bits(&sim), all_bits(&other));
     assert!(
-        sim.rollout_until(&unset, &controls, None, ALL).unwrap().states
+        rollout_until(&sim, &unset, &controls, None, ALL).unwrap().states
             == other.rollout(&controls, None, ALL).unwrap().states
     );
-    assert_eq!(sim.update_until(&unset, 37), 37);
+    assert_eq!(update_until(&mut sim, &unset, 37), 37);
     other.update(37);
     assert_eq!(all_bits(&sim), all_bits(&other));
 }
