@@ -135,7 +135,11 @@ impl CompatibilityFlags {
     fn notes(&self) -> Vec<String> {
         let cameras = "cameras render on the CPU, with or without a window";
         let flags = [
-            (self.gpu_id.is_some(), "--gpu-id", "--device cuda:N chooses the GPU of the physics, and cameras run on the CPU"),
+            (
+                self.gpu_id.is_some(),
+                "--gpu-id",
+                "--device cuda:N chooses the GPU of the physics, and cameras run on the CPU",
+            ),
             (self.enable_cameras, "--enable-cameras", cameras),
             (self.offscreen_render, "--offscreen-render", cameras),
         ];

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import shutil
 import subprocess
@@ -39,9 +40,16 @@ def rng():
 @pytest.fixture
 def display():
     """A virtual display."""
+    with virtual_display() as name:
+        yield name
+
+
+@contextlib.contextmanager
+def virtual_display(*options):
+    """A virtual display, by its name."""
     if shutil.which("Xvfb") is None:
         pytest.fail("this test needs Xvfb")
-    process = subprocess.Popen(["Xvfb", "-displayfd", "1", "-screen", "0", "1280x800x24"], stdout=subprocess.PIPE, text=True)
+    process = subprocess.Popen(["Xvfb", "-displayfd", "1", "-screen", "0", "1280x800x24", *options], stdout=subprocess.PIPE, text=True)
     try:
         yield f":{process.stdout.readline().strip()}"
     finally:

@@ -124,7 +124,7 @@ pub use interactive_scene::{
 };
 pub(crate) use kinetoscope_scene::pattern;
 pub use light_cfg::{LightCfg, LightKindCfg};
-pub use manager::SimulationManager;
+pub use manager::{SimulationManager, update_until};
 pub use mjcf::document::{FrictionCone, Integrator};
 pub use mjcf::error::RobotMjcfError;
 pub use mjcf::part::PartError;
@@ -152,7 +152,7 @@ pub use randomization::{
     EnvProperties, EnvPropertiesMut, Properties, Property, Randomization, RandomizationError, RandomizationOp,
     RandomizationTerm,
 };
-pub use rollout::Rollout;
+pub use rollout::{Rollout, rollout_until};
 pub use scene_view::{SceneView, SceneViewMut};
 pub use sensor_list::SensorId;
 pub use shard::{Shard, ShardError};

@@ -31,7 +31,8 @@ use kinetoscope_scene::EnvScene;
 use kinetoscope_scene::StateFields;
 use kinetoscope_sensors::{Sensor, SensorCfg, SensorContext};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::time::Instant;
 
 /// Source of the serial numbers that bind a handle to the manager that created it.
 static NEXT_MANAGER: AtomicU64 = AtomicU64::new(0);
@@ -567,4 +568,20 @@ fn load_on_device(
         }
         Err(error) => Err((error, device)),
     }
+}
+
+/// [Steps](SimulationManager::update) all environments until another thread sets `stop`. Returns the number of steps done:
+/// all of them, or fewer if the flag was set. It is read before blocks of steps, each of about 50 ms or one step.
+pub fn update_until(sim: &mut SimulationManager, stop: &AtomicBool, steps: u32) -> u32 {
+    const LONGEST_BLOCK: f64 = 0.05;
+    let (mut done, mut block) = (0, 1);
+    while done < steps && !stop.load(Ordering::Relaxed) {
+        let (started, now) = (Instant::now(), block.min(steps - done));
+        sim.update(now);
+        done += now;
+        // At most twice as many steps as before, so that one fast block does not lead to a long one.
+        let per_step = started.elapsed().as_secs_f64() / f64::from(now);
+        block = ((LONGEST_BLOCK / per_step.max(1e-9)) as u32).clamp(1, block.saturating_mul(2));
+    }
+    done
 }

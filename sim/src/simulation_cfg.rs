@@ -126,6 +126,24 @@ impl SimulationManagerCfg {
         origins
     }
 
+    /// Number of physics steps in a time \[s\], which must be a whole number of `physics_dt`.
+    ///
+    /// # Errors
+    /// The time is negative, is not a whole number of steps, or is more than `u32::MAX` steps.
+    pub fn steps_in(&self, seconds: f64) -> Result<u32> {
+        let steps = seconds / self.physics_dt;
+        let whole = steps.round();
+        // Tolerance for the quotient of two rounded numbers: 0.1 / 0.005 need not be 20.
+        if !((steps - whole).abs() <= 1e-6 && (0.0..=f64::from(u32::MAX)).contains(&whole)) {
+            return Err(Error::Config {
+                field: "seconds",
+                value: seconds.to_string(),
+                expected: "it must be a whole number of physics_dt, at most 4294967295 of them",
+            });
+        }
+        Ok(whole as u32)
+    }
+
     /// Number of threads for rendering and ray casting: [`threads`](Self::threads), or the number of cores. Stepping
     /// uses at most one thread per environment.
     pub fn num_threads(&self) -> usize {

@@ -6,7 +6,7 @@ use kinetoscope::robot::dynamics::DynamicsError;
 use kinetoscope::sensors::SensorError;
 use kinetoscope::sim::inspect::InspectError;
 use kinetoscope::sim::{DeviceError, Error};
-use kinetoscope::viewer::{ScreenshotError, ServeError, WindowError};
+use kinetoscope::viewer::{PlayError, ScreenshotError, ServeError, WindowError};
 use pyo3::prelude::*;
 use std::any::Any;
 
@@ -189,6 +189,7 @@ macro_rules! classes {
 
 classes! {
     RecordError => Recording,
+    PlayError => Recording,
     ServeError => Viewer,
     WindowError => Viewer,
     ScreenshotError => Viewer,
