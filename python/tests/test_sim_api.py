@@ -79,7 +79,7 @@ NOT_VIEWS = {
         SegmentedEntity Space StreamField StreamSchema Topic EventKind""",
     "pixels and arrays, which are NumPy arrays in Python": "Canvas History RayImages RobotState",
     "traits and types with which Rust programs add sensors, tasks, entities or viewers of their own": """
-        ActionTerm AnySensorCfg AnySensorId CommandTerm CurriculumTerm DriveMode EntityTypes EnvBuilder EpisodeRng EventContext
+        ActionTerm AnySensorCfg AnySensorId CommandTerm CurriculumTerm DevicePhysics DriveMode EntityTypes EnvBuilder EpisodeRng EventContext
         EventTerm ImageTerm ObservationTerm Observer Observers ObserversMut Phases PlaybackSource Poses RecordButton RecordControl
         RewardTerm SampleChannel Sampler Schedule Sensor SensorCfg SensorContext SensorSlot StateRequirements StepResult TermArgs
         TermContext TermRegistry TerminationTerm VectorEnv""",
@@ -234,6 +234,8 @@ LEFT_OUT = {
     "Sampled.force_stamp_history": "stamp_history has the times of the rows",
     "Sampled.history_filled": "with sample_counts and the length of history",
     "Sampled.latest_delivered_force_stamps": "numeric sensors: history has the delivered values",
+    "SceneView.device_failure": "update raises it",
+    "SceneView.with_device": "device_array has the arrays",
     "SceneView.body_motion": "velocities are properties of robots and objects",
     "SceneView.markers": EXTENSION,
     "SceneView.markers_except": EXTENSION,

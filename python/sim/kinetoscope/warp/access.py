@@ -6,6 +6,7 @@ from typing import Any
 
 import mujoco_warp as mjw
 import numpy as np
+from numpy.typing import NDArray
 import warp as wp
 
 from . import kernels
@@ -84,7 +85,7 @@ def model_array(worlds: Worlds, name: str) -> wp.array:
     return array
 
 
-def write(worlds: Worlds, name: str, envs: np.ndarray | None, values: np.ndarray) -> None:
+def write(worlds: Worlds, name: str, envs: NDArray[Any] | None, values: NDArray[Any]) -> None:
     """Writes rows of the array `name`, one of `WRITABLE`: those of the environments `envs`, or of all."""
     array = writable_array(worlds, name)
     width = row_width(array)
@@ -109,7 +110,7 @@ def write(worlds: Worlds, name: str, envs: np.ndarray | None, values: np.ndarray
         worlds.is_forward_needed = True
 
 
-def prepare_model(worlds: Worlds, name: str, values: np.ndarray) -> None:
+def prepare_model(worlds: Worlds, name: str, values: NDArray[Any]) -> None:
     """Enables the parts of a step that Warp or `model.prepare` left out for the model as it was loaded."""
     flag = int(mjw.DisableBit.EULERDAMP)
     if name == "dof_damping" and values.any() and worlds.model.opt.disableflags & flag:
@@ -120,7 +121,7 @@ def prepare_model(worlds: Worlds, name: str, values: np.ndarray) -> None:
         worlds.graphs.clear()
 
 
-def padded_equalities(values: np.ndarray, count: int, width: int) -> np.ndarray:
+def padded_equalities(values: NDArray[Any], count: int, width: int) -> NDArray[Any]:
     """Numbers of equality constraints in the layout of MuJoCo 4. Those of MuJoCo 2.2.2 get zeros."""
     if values.shape[1] != OLD_EQUALITY_NUMBERS * count or count == 0:
         return values
@@ -128,7 +129,7 @@ def padded_equalities(values: np.ndarray, count: int, width: int) -> np.ndarray:
     return np.pad(rows, ((0, 0), (0, 0), (0, width // count - OLD_EQUALITY_NUMBERS))).reshape(len(values), width)
 
 
-def read(worlds: Worlds, name: str) -> np.ndarray:
+def read(worlds: Worlds, name: str) -> NDArray[Any]:
     """Numbers of the array `name`, one of `READABLE`, float32, shape (environments, numbers); (contacts, 19) for contacts."""
     if name == "contacts" or name in CAPTURED:
         if name not in worlds.captured:
@@ -148,7 +149,7 @@ def read(worlds: Worlds, name: str) -> np.ndarray:
     return np.ascontiguousarray(rows_of(array).numpy())
 
 
-def read_contacts(worlds: Worlds) -> np.ndarray:
+def read_contacts(worlds: Worlds) -> NDArray[Any]:
     """Captured contacts, sorted by environment, geoms, and number within the pair."""
     count = int(worlds.captured["used"].numpy()[0])
     if count == 0:

@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .errors import ArgumentError, DeviceError
 from .model import SCENE_FILE, load_scene
@@ -42,11 +43,11 @@ class BenchmarkScene:
     folder: Path
     numbers: str
     """JSON of drives and of numbers of the compiled model."""
-    qpos: np.ndarray
+    qpos: NDArray[Any]
     """Initial positions, shape (nq,)."""
-    ctrl: np.ndarray
+    ctrl: NDArray[Any]
     """Target of each actuator, shape (nu,)."""
-    drive_ctrl: np.ndarray
+    drive_ctrl: NDArray[Any]
     """Actuator of each drive with a constraint row, shape (drives,)."""
 
 
@@ -92,7 +93,7 @@ def read_scene(folder: Path) -> BenchmarkScene:
     return BenchmarkScene(folder, numbers, qpos, ctrl, scene.ctrl)
 
 
-def repeated(row: np.ndarray, envs: int) -> np.ndarray:
+def repeated(row: NDArray[Any], envs: int) -> NDArray[Any]:
     """The same row for each environment, shape (envs, numbers)."""
     return np.tile(np.asarray(row, np.float32), (envs, 1))
 

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .errors import DeviceError, UnsupportedSceneError
 
@@ -37,21 +38,21 @@ class Scene:
     model: Any
     """`mujoco.MjModel`, prepared for constraint rows of drives."""
     drive_names: list[str]
-    dof: np.ndarray
+    dof: NDArray[Any]
     """Degree of freedom of each drive, shape (drives,)."""
-    qpos: np.ndarray
+    qpos: NDArray[Any]
     """Index of each drive in `qpos`, shape (drives,)."""
-    ctrl: np.ndarray
+    ctrl: NDArray[Any]
     """Index of each drive in `ctrl`, shape (drives,)."""
-    stiffness: np.ndarray
+    stiffness: NDArray[Any]
     """Stiffness [N m/rad or N/m], shape (drives,)."""
-    damping: np.ndarray
+    damping: NDArray[Any]
     """Damping [N m s/rad or N s/m], shape (drives,)."""
-    max_effort: np.ndarray
+    max_effort: NDArray[Any]
     """Limit of the effort [N m or N], shape (drives,)."""
-    damped: np.ndarray
+    damped: NDArray[Any]
     """Degrees of freedom with implicit damping, shape (damped,)."""
-    viscous_damping: np.ndarray
+    viscous_damping: NDArray[Any]
     """Coefficients of the implicit damping [N m s/rad or N s/m], shape (damped,)."""
 
 
@@ -129,7 +130,7 @@ def replace_numbers(model: Any, arrays: dict[str, list[float]]) -> None:
     mujoco.mj_setConst(model, mujoco.MjData(model))
 
 
-def check_indices(model: Any, drives: list[dict[str, Any]], damped: np.ndarray, silent: list[int]) -> None:
+def check_indices(model: Any, drives: list[dict[str, Any]], damped: NDArray[Any], silent: list[int]) -> None:
     """Raises DeviceError for an index outside of the model, and for two drives of one degree of freedom."""
     indices = [(f'drive "{drive["name"]}"', axis, drive[axis], size)
                for drive in drives for axis, size in (("dof", model.nv), ("qpos", model.nq), ("ctrl", model.nu))]

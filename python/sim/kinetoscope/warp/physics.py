@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .errors import ArgumentError, DeviceError, UnknownNameError
 from .model import load_scene
@@ -57,7 +58,7 @@ class WarpPhysics:
             # Kernels are compiled at the first step: a program may add further entities before.
             self._worlds = Worlds(load_scene(folder, scene), self._device, num_envs)
 
-    def write(self, name: str, envs: np.ndarray | None, values: np.ndarray) -> None:
+    def write(self, name: str, envs: NDArray[Any] | None, values: NDArray[Any]) -> None:
         """Writes rows of the array `name`: those of the environments `envs`, or of all.
 
         `values` has shape (environments, numbers). A write of "qpos" lets a diverged environment step again.
@@ -114,7 +115,7 @@ class WarpPhysics:
             self._run(worlds, "solve_once", 1, wanted, grown, warnings)
         return json.dumps({"diverged": [], "grown": grown, "warnings": warnings})
 
-    def read(self, name: str) -> np.ndarray:
+    def read(self, name: str) -> NDArray[Any]:
         """Numbers of the array `name`, float32, shape (environments, numbers).
 
         For "contacts", shape (contacts, 19): environment, two geoms, distance [m], point [m] (3), normal from the first geom to the

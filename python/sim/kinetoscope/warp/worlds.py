@@ -9,6 +9,7 @@ from typing import Any
 
 import mujoco_warp as mjw
 import numpy as np
+from numpy.typing import NDArray
 import warp as wp
 
 from . import kernels, sizes
@@ -89,7 +90,7 @@ class Worlds:
         self.is_forward_needed = True
         self.are_bodies_moved = False
 
-    def repeated(self, numbers: np.ndarray) -> wp.array:
+    def repeated(self, numbers: NDArray[Any]) -> wp.array:
         """The same row of numbers for each environment."""
         return wp.array(np.tile(np.asarray(numbers, np.float32), (self.num_envs, 1)), dtype=float)
 
