@@ -71,7 +71,10 @@ impl Worker {
         };
         let mut worker = Self { device, child, requests, answers: BufReader::new(answers), log };
         let answer = worker.answer().map_err(|error| {
-            unavailable(format!("{error}; it needs the Python package: {name} -m pip install 'kinetoscope[cuda]'"))
+            unavailable(format!(
+                "{error}; it needs the Python package kinetoscope, which names packages that are missing; {PYTHON} can name \
+                 another Python"
+            ))
         })?;
         if answer.ok { Ok(worker) } else { Err(unavailable(answer.error)) }
     }
