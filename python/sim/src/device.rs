@@ -81,7 +81,7 @@ impl DevicePhysics for PythonPhysics {
     fn read(&mut self, array: &str) -> Result<Vec<f32>, DeviceError> {
         self.call(|object| {
             let values = object.call_method1("read", (array,))?;
-            let values: PyReadonlyArrayDyn<'_, f32> = values.extract().map_err(PyErr::from)?;
+            let values: PyReadonlyArrayDyn<'_, f32> = values.extract()?;
             Ok(values.as_array().iter().copied().collect())
         })
     }
