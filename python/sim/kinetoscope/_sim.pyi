@@ -350,8 +350,8 @@ class SimulationManager:
         """The MJCF document of the simulation."""
     def device_array(self, /, name: str) -> Any:
         """An array of the physics on a device, without a copy: a ``warp.array`` with a row per environment, for
-        ``warp.to_torch`` and DLPack. Names: ``qpos``, ``qvel``, ``qacc_warmstart``, ``act`` and ``qacc``. Raises ``DeviceError``
-        on the device ``cpu``.
+        ``warp.to_torch`` and DLPack. Names: ``qpos``, ``qvel``, ``qacc_warmstart``, ``act`` and ``qacc``. Raises
+        ``DeviceError`` on the device ``cpu``.
         """
 
     @property
