@@ -96,7 +96,7 @@ macro_rules! number_arrays {
     ($($constant:ident = $name:ident;)*) => {
         impl NumberArray {
             $(
-                #[doc = concat!("MuJoCo's `", stringify!($name), "`, as in [`Model::", stringify!($name), "`].")]
+                #[doc = concat!("MuJoCo's `", stringify!($name), "`.")]
                 pub const $constant: Self = Self {
                     name: stringify!($name),
                     // SAFETY: the compiled model lives as long as `model`, and nothing writes to it.

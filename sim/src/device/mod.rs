@@ -125,7 +125,8 @@ pub trait DevicePhysics: Send + std::fmt::Debug {
     fn write(&mut self, array: &str, envs: &[i32], values: &[f32]) -> Result<(), DeviceError>;
 
     /// Steps all environments, and captures `capture` (`contacts`, `motion`, `wrenches`) in the last step. Returns a
-    /// report as JSON: the fields of [`StepReport`].
+    /// report as JSON: `diverged`, a list of environment, step in the call and reason; `grown`, a list of constraint rows and
+    /// contacts per environment that buffers grew to.
     ///
     /// # Errors
     /// The device failed.
