@@ -126,6 +126,7 @@ fn scene_cfg(args: &Args) -> launcher::Result<SceneCfg> {
     let from_flags = args.launcher.simulation()?;
     cfg.simulation = SimulationManagerCfg {
         num_envs: from_flags.num_envs,
+        device: from_flags.device,
         seed: from_flags.seed,
         threads: from_flags.threads,
         arena_space: args.launcher.arena_space.unwrap_or(cfg.simulation.arena_space),

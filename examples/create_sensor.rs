@@ -95,7 +95,7 @@ fn run(args: &Args) -> launcher::Result {
     let mut sim = SimulationManager::new(SimulationManagerCfg {
         physics_dt: 1.0 / 100.0,
         arena_space: args.launcher.arena_space.unwrap_or(3.0),
-        ..args.launcher.simulation_for_any_renderer()?
+        ..args.launcher.simulation_for_any_renderer()
     })?;
 
     println!("Loading robot...");

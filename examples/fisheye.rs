@@ -63,7 +63,7 @@ fn run(args: &Args) -> launcher::Result {
     };
     let renderer = renderer.for_cameras(args.paths)?;
     let views = views(args)?;
-    let mut sim = SimulationManager::new(args.launcher.simulation_for_any_renderer()?)?;
+    let mut sim = SimulationManager::new(args.launcher.simulation_for_any_renderer())?;
     let robot = sim.add_robot(assets::sr5_with_hand()?)?;
     add_objects(&mut sim)?;
     let cameras = views

@@ -70,7 +70,7 @@ fn run(args: &Args) -> launcher::Result {
     };
     let mut sim = SimulationManager::new(SimulationManagerCfg {
         lights: vec![light],
-        ..args.launcher.simulation_for_any_renderer()?
+        ..args.launcher.simulation_for_any_renderer()
     })?;
     const RADIUS: f64 = 0.16;
     for (k, (uid, rgba, surface)) in (0..).zip(materials()) {

@@ -18,6 +18,7 @@ pages! {
     Determinism: "../docs/determinism.md";
     FirstCamera: "../docs/first-camera.md";
     FirstRobot: "../docs/first-robot.md";
+    Gpu: "../docs/gpu.md";
     #[cfg(feature = "record")]
     Recordings: "../docs/recording.md";
     Robots: "../docs/robots.md";

@@ -65,6 +65,9 @@ pub(crate) fn run(args: &Args) -> Result<CommandStatus> {
     };
     let share = || Some(start.elapsed().as_secs_f64() / args.seconds);
     let elapsed = progress::with_progress("steps", share, step);
+    if let Some(error) = model.sim.scene().device_failure() {
+        return Err(error.into());
+    }
     // A diverged environment no longer steps, so its later steps are not counted.
     let diverged = model.sim.diverged();
     let stopped = diverged.len();

@@ -100,6 +100,9 @@ pub(crate) fn run(args: &Args) -> Result<CommandStatus> {
     while !interrupted.load(Ordering::SeqCst) && args.steps.is_none_or(|steps| step < steps) && closed().is_none() {
         sim.update(1);
         step += 1;
+        if sim.scene().device_failure().is_some() {
+            break;
+        }
     }
     let recorded = files.lock().unwrap_or_else(PoisonError::into_inner).finish(&mut sim);
     for recorded in recorded.map_err(|error| format!("--record {error}"))? {
@@ -110,6 +113,9 @@ pub(crate) fn run(args: &Args) -> Result<CommandStatus> {
     }
     if let Some(reason) = closed().as_ref().and_then(Closed::error) {
         return Err(format!("the window was lost after {step} steps: {reason}").into());
+    }
+    if let Some(error) = sim.scene().device_failure() {
+        return Err(error.into());
     }
     let diverged = sim.diverged();
     for one in &diverged {

@@ -18,6 +18,7 @@ pub(crate) mod views;
 use clap::{Args, ValueEnum};
 use indicatif::{ProgressBar, ProgressStyle};
 use kinetoscope::prelude::*;
+use kinetoscope::sim::Device;
 use std::cell::Cell;
 use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
@@ -49,8 +50,9 @@ pub(crate) struct Launcher {
     /// that other machines can reach (0.0.0.0:8765) requires the printed token. Build with --features foxglove
     #[arg(long, value_name = "PORT", num_args = 0..=1, default_missing_value = "8765")]
     pub(crate) foxglove: Option<String>,
-    /// Device of the physics: cpu; cuda and cuda:N are refused with an explanation
-    #[arg(long, value_name = "DEVICE", default_value = "cpu", value_parser = device)]
+    /// Device of the physics: cpu; cuda or cuda:N for MuJoCo Warp on a GPU, which is experimental and needs the Python
+    /// package; warp-cpu for the same without a GPU
+    #[arg(long, value_name = "DEVICE", default_value_t = Device::Cpu)]
     pub(crate) device: Device,
     #[command(flatten)]
     elsewhere: CompatibilityFlags,
@@ -111,25 +113,6 @@ fn rate(text: &str) -> std::result::Result<(String, u64), String> {
     Ok((name.trim().to_owned(), steps))
 }
 
-/// Device of the physics.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) enum Device {
-    /// The CPU.
-    Cpu,
-    /// A CUDA device by its given name (not supported).
-    Cuda(String),
-}
-
-fn device(text: &str) -> std::result::Result<Device, String> {
-    let is_card =
-        |number: &str| number.is_empty() || number.strip_prefix(':').is_some_and(|n| n.parse::<u32>().is_ok());
-    match text {
-        "cpu" => Ok(Device::Cpu),
-        _ if text.strip_prefix("cuda").is_some_and(is_card) => Ok(Device::Cuda(text.into())),
-        _ => Err("the devices are cpu, cuda and cuda:N, and physics runs on cpu only".into()),
-    }
-}
-
 /// Flags of EmbodiChain's and Isaac Lab's launchers, accepted so that their command lines run here.
 #[derive(Clone, Debug, Args)]
 struct CompatibilityFlags {
@@ -152,7 +135,11 @@ impl CompatibilityFlags {
     fn notes(&self) -> Vec<String> {
         let cameras = "cameras render on the CPU, with or without a window";
         let flags = [
-            (self.gpu_id.is_some(), "--gpu-id", "physics and cameras run on the CPU; --threads chooses how many cores"),
+            (
+                self.gpu_id.is_some(),
+                "--gpu-id",
+                "--device cuda:N chooses the GPU of the physics, and cameras run on the CPU",
+            ),
             (self.enable_cameras, "--enable-cameras", cameras),
             (self.offscreen_render, "--offscreen-render", cameras),
         ];
@@ -238,7 +225,7 @@ impl Launcher {
     /// The simulation of these flags, for an example that renders with the rasterizer or has no camera.
     ///
     /// # Errors
-    /// The device is not supported, or another renderer is requested.
+    /// Another renderer is requested.
     pub(crate) fn simulation(&self) -> Result<SimulationManagerCfg> {
         if !matches!(self.renderer, Renderer::Auto | Renderer::Raster) {
             let name = self.renderer.name();
@@ -248,28 +235,19 @@ impl Launcher {
             )
             .into());
         }
-        self.simulation_for_any_renderer()
+        Ok(self.simulation_for_any_renderer())
     }
 
     /// The simulation of these flags, for an example that supports every renderer or accepts every name.
-    ///
-    /// # Errors
-    /// The device is not supported.
-    pub(crate) fn simulation_for_any_renderer(&self) -> Result<SimulationManagerCfg> {
-        if let Device::Cuda(name) = &self.device {
-            return Err(format!(
-                "--device {name} is not supported: Kinetoscope simulates on the CPU; use --device cpu, and --threads to choose \
-                 how many cores"
-            )
-            .into());
-        }
+    pub(crate) fn simulation_for_any_renderer(&self) -> SimulationManagerCfg {
         self.elsewhere.notes().iter().for_each(|note| println!("{note}"));
-        Ok(SimulationManagerCfg {
+        SimulationManagerCfg {
             num_envs: self.num_envs,
+            device: self.device,
             seed: self.seed,
             threads: self.threads,
             ..Default::default()
-        })
+        }
     }
 
     /// Writes every stage of the pipeline to the folder of `--dump`; prints a warning for each item that is left out.

@@ -430,6 +430,11 @@ impl Model {
         false
     }
 
+    /// Number of mocap bodies.
+    pub fn nmocap(&self) -> usize {
+        self.header().nmocap as usize
+    }
+
     /// Code of the integrator (`mjINT_EULER`, ...).
     pub fn integrator(&self) -> u32 {
         self.header().opt.integrator as u32

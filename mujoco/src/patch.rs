@@ -96,7 +96,7 @@ macro_rules! number_arrays {
     ($($constant:ident = $name:ident;)*) => {
         impl NumberArray {
             $(
-                #[doc = concat!("MuJoCo's `", stringify!($name), "`, as in [`Model::", stringify!($name), "`].")]
+                #[doc = concat!("MuJoCo's `", stringify!($name), "`.")]
                 pub const $constant: Self = Self {
                     name: stringify!($name),
                     // SAFETY: the compiled model lives as long as `model`, and nothing writes to it.
@@ -112,12 +112,26 @@ number_arrays! {
     BODY_INERTIA = body_inertia;
     BODY_IPOS = body_ipos;
     BODY_POS = body_pos;
+    BODY_IQUAT = body_iquat;
+    BODY_QUAT = body_quat;
+    BODY_SUBTREEMASS = body_subtreemass;
+    BODY_INVWEIGHT0 = body_invweight0;
+    DOF_ARMATURE = dof_armature;
     DOF_DAMPING = dof_damping;
+    DOF_FRICTIONLOSS = dof_frictionloss;
+    DOF_INVWEIGHT0 = dof_invweight0;
+    TENDON_FRICTIONLOSS = tendon_frictionloss;
+    TENDON_INVWEIGHT0 = tendon_invweight0;
     GEOM_FRICTION = geom_friction;
     GEOM_SIZE = geom_size;
 }
 
 impl NumberArray {
+    /// MuJoCo's name of the array.
+    pub fn name(self) -> &'static str {
+        self.name
+    }
+
     /// Numbers of the array in the compiled model of `model` with the differences `patch`.
     pub fn all(self, model: &Model, patch: Option<&ModelPatch>) -> Vec<f64> {
         let mut numbers = (self.compiled)(model).to_vec();
@@ -175,7 +189,7 @@ impl ModelPatch {
     }
 
     /// Names and sizes \[bytes\] of the arrays with differences.
-    pub(super) fn arrays(&self) -> impl Iterator<Item = (&'static str, usize)> {
+    pub fn arrays(&self) -> impl Iterator<Item = (&'static str, usize)> {
         self.layout.fields.iter().map(|field| (field.array.name, field.array.bytes))
     }
 

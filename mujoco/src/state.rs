@@ -184,6 +184,22 @@ impl IntegrationState {
         &self.values[first..first + model.nv()]
     }
 
+    /// Saved activations of actuators, shape (na,). `model` is the model of the saved data.
+    pub fn act(&self, model: &Model) -> &[f64] {
+        let first = 1 + model.nq() + model.nv();
+        &self.values[first..first + model.na()]
+    }
+
+    /// Saved time \[s\], positions, velocities, activations and warm start, for writing. `model` is the model of the
+    /// saved data.
+    pub fn parts_mut(&mut self, model: &Model) -> [&mut [f64]; 5] {
+        let (time, rest) = self.values.split_at_mut(1);
+        let (qpos, rest) = rest.split_at_mut(model.nq());
+        let (qvel, rest) = rest.split_at_mut(model.nv());
+        let (act, rest) = rest.split_at_mut(model.na());
+        [time, qpos, qvel, act, &mut rest[..model.nv()]]
+    }
+
     /// All numbers, time first.
     pub fn values(&self) -> &[f64] {
         &self.values
@@ -249,6 +265,18 @@ impl JointInputs {
 }
 
 impl BodyInputs {
+    /// Forces and torques applied to bodies \[N, N m\], 6 numbers per body. `model` is the model of the saved data.
+    pub fn xfrc_applied(&self, model: &Model) -> &[f64] {
+        &self.values[..6 * model.nbody()]
+    }
+
+    /// Positions \[m\], 3 numbers per mocap body, then quaternions, 4 numbers per mocap body. `model` is the model of the
+    /// saved data.
+    pub fn mocap(&self, model: &Model) -> (&[f64], &[f64]) {
+        let (first, count) = (6 * model.nbody(), model.nmocap());
+        self.values[first..first + 7 * count].split_at(3 * count)
+    }
+
     /// True if `data` has the same inputs, bit for bit.
     pub fn matches(&self, data: &Data) -> bool {
         #[cfg(mj4)]
@@ -278,6 +306,17 @@ impl BodyInputs {
 }
 
 impl SolvedState {
+    /// Accelerations, joint forces of actuators and joint forces of constraints, each of shape (nv,), then the forces of
+    /// actuators, for writing. `model` is the model of the saved data.
+    pub fn parts_mut(&mut self, model: &Model) -> [&mut [f64]; 4] {
+        let nv = model.nv();
+        let (qacc, rest) = self.values.split_at_mut(nv);
+        let (actuator, rest) = rest.split_at_mut(nv);
+        let (constraint, rest) = rest.split_at_mut(nv);
+        let forces = rest.len() - model.nsensordata();
+        [qacc, actuator, constraint, &mut rest[..forces]]
+    }
+
     /// All numbers.
     pub fn values(&self) -> &[f64] {
         &self.values

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import shutil
 import subprocess
@@ -16,6 +17,7 @@ os.environ["RAY_worker_niceness"] = "0"
 
 def pytest_configure(config):
     config.addinivalue_line("markers", "needs_seeds: needs the tutorials of EmbodiChain and Orbit in KINETOSCOPE_SEEDS")
+    config.addinivalue_line("markers", "needs_warp: needs mujoco-warp and warp-lang")
     config.addinivalue_line("markers", "needs_learning: needs torch and the libraries of kinetoscope.rl")
 
 
@@ -38,9 +40,16 @@ def rng():
 @pytest.fixture
 def display():
     """A virtual display."""
+    with virtual_display() as name:
+        yield name
+
+
+@contextlib.contextmanager
+def virtual_display(*options):
+    """A virtual display, by its name."""
     if shutil.which("Xvfb") is None:
         pytest.fail("this test needs Xvfb")
-    process = subprocess.Popen(["Xvfb", "-displayfd", "1", "-screen", "0", "1280x800x24"], stdout=subprocess.PIPE, text=True)
+    process = subprocess.Popen(["Xvfb", "-displayfd", "1", "-screen", "0", "1280x800x24", *options], stdout=subprocess.PIPE, text=True)
     try:
         yield f":{process.stdout.readline().strip()}"
     finally:

@@ -134,5 +134,6 @@ def test_images_on_their_way():
     imu = sim.add_sensor("imu", ks.ImuCfg(body="ball"))
     with pytest.raises(ks.UnknownNameError, match="no delivered images"):
         imu.latest_delivered("ang_vel_b")
+    assert imu.stamp_history.shape == (2, 0)
     with pytest.raises(ks.ArgumentError, match="not a camera"):
-        imu.stamp_history  # noqa: B018
+        imu.image_shape  # noqa: B018

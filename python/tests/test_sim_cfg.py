@@ -180,7 +180,7 @@ def test_entities_have_default_names(cls):
 WITHOUT_A_CLASS = {
     "EnvCfg": "its fields are those of TaskCfg",
     "ExclusionCfg": "a pair of names in from_scene, and the arguments of exclude_collision",
-    "ImageWindowCfg": "windows of images are not in Python",
+    "ImageWindowCfg": "its fields are the arguments of ImageWindow",
     "JointPositionsCfg": "a term of tasks: a dict with its type",
     "SceneCfg": "the dict of from_scene: simulation, entities by name, exclude_collisions",
     "TerrainLevelsCfg": "a term of tasks: a dict with its type",
@@ -310,6 +310,7 @@ VARIANTS = [
     (ks.ObjectShape.sphere(radius=1.0), "rigid_object", "shape"),
     (ks.ObjectShape.cylinder(radius=1.0, length=2.0), "rigid_object", "shape"),
     (ks.ObjectShape.capsule(radius=1.0, length=2.0), "rigid_object", "shape"),
+    (ks.ObjectShape.mesh(path="a.stl"), "rigid_object", "shape"),
     (ks.MeshCollision.pieces(ks.ConvexDecompositionCfg(max_pieces=3)), "rigid_object", "mesh_collision"),
     (ks.MeshCollision.triangles(thickness=0.1), "rigid_object", "mesh_collision"),
     (ks.Intrinsics.pixels(fx=1, fy=2, cx=3, cy=4), "camera", "intrinsics"),

@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 
 import kinetoscope as ks
-from kinetoscope import _sim
 
 START = [0.0, 0.5, -1.5, 0.3, -0.5, 0.0]
 
@@ -185,21 +184,44 @@ def test_destroyed_simulations(arm_sim):
         other.update()
 
 
-@pytest.mark.parametrize("write", [False, True])
-def test_panics_are_exceptions(arm_sim, write):
+@pytest.mark.parametrize(
+    "cfg",
+    [
+        ks.SimulationManagerCfg(),
+        ks.SimulationManagerCfg.legged(num_envs=3, ground=None, threads=2, lights=[]),
+        ks.SimulationManagerCfg(
+            ground=ks.GroundCfg(checker=False, surface=ks.SurfaceCfg(roughness=0.25)), shard=ks.Shard(rank=1, world=3), seed=9,
+            lights=[ks.LightCfg(kind=ks.LightKindCfg.dome(intensity=2.0)), ks.LightCfg(color=(1.0, 0.5, 0.25))],
+        ),
+    ],
+    ids=["default", "legged", "parts"],
+)  # fmt: skip
+def test_the_configuration_of_a_simulation(cfg):
+    """What the program gave, with all its values and classes; a copy that makes an equal simulation."""
+    sim = ks.SimulationManager(cfg)
+    assert sim.cfg == cfg and repr(sim.cfg) == repr(cfg)
+    sim.cfg.num_envs = 100
+    assert sim.cfg == cfg and ks.SimulationManager(sim.cfg).cfg == cfg
+    # Every field has its own value: a control that none of them is the default by chance.
+    changed = ks.SimulationManager(cfg, physics_dt=0.004, friction=[0.5, 0.0, 0.0], solver_iterations=7).cfg
+    assert (changed.physics_dt, changed.friction, changed.solver_iterations) == (0.004, (0.5, 0.0, 0.0), 7)
+
+
+def test_steps_in_seconds(arm_sim):
+    sim, _ = arm_sim
+    sim.update_for(0.0)
+    sim.update_for(0.3)
+    np.testing.assert_array_equal(sim.time, np.full(2, sum([0.01] * 30)))
+
+
+def test_engine_states_have_the_names_of_rollouts(arm_sim):
     sim, arm = arm_sim
-    try:
-        _sim._panic(sim, write)
-    except Exception as error:  # noqa: BLE001
-        assert isinstance(error, ks.InternalError) and "requested by a test" in str(error)
-    else:
-        pytest.fail("no exception")
-    if write:
-        with pytest.raises(ks.InternalError, match="create a new simulation"):
-            arm.qpos  # noqa: B018
-        sim.destroy()
-    else:
-        assert arm.qpos.shape == (2, 6)
+    arm.write_qpos([START, [0.1] * 6])
+    qpos, qvel = sim.engine_states
+    assert [name.split()[0] for name in sim.state_names] == ["qpos"] * qpos.shape[1] + ["qvel"] * qvel.shape[1]
+    np.testing.assert_array_equal(qpos, arm.qpos)
+    np.testing.assert_array_equal(qvel, arm.qvel)
+    np.testing.assert_array_equal(np.concatenate([qpos, qvel], axis=1).shape, (2, len(sim.state_names)))
 
 
 def test_handles_belong_to_their_simulation(arm_sim):

@@ -1,7 +1,9 @@
 """Entities, states, kinematics, properties, snapshots, shards, recordings and views of the package kinetoscope."""
 
+import copy
 import http.client
 import json
+import pickle
 import socket
 import subprocess
 import sys
@@ -503,7 +505,8 @@ def test_a_window_needs_a_display():
 
 
 def test_diagnostics_and_divergence(tmp_path):
-    urdf = """<robot name="r"><link name="a"/><link name="b"><inertial><mass value="1"/>
+    urdf = """<robot name="r"><link name="a"/>
+      <link name="b"><inertial><mass value="1"/>
       <inertia ixx="1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/></inertial></link>
       <joint name="j" type="revolute"><parent link="a"/><child link="b"/><axis xyz="0 0 1"/><limit lower="-1" upper="1"/></joint></robot>"""
     (tmp_path / "r.urdf").write_text(urdf)
@@ -511,10 +514,19 @@ def test_diagnostics_and_divergence(tmp_path):
     sim.add_robot(uid="r", urdf=tmp_path / "r.urdf")
     assert any("r.urdf:" in text and "b" in text for text in sim.diagnostics)
     assert "inertia-repaired" in sim.warnings
+    # The parts of a diagnostic: the judge of the line is the text of the file.
+    repaired = next(found for found in sim.diagnostics if found.kind == "inertia-repaired")
+    assert repaired.file == tmp_path / "r.urdf" and "<inerti" in urdf.split("\n")[repaired.line - 1]
+    assert repaired == f"{repaired.file}:{repaired.line}: {repaired.message} [{repaired.kind}]" and isinstance(repaired, ks.Diagnostic)
+    for copied in (pickle.loads(pickle.dumps(repaired)), copy.deepcopy(repaired)):
+        assert vars(copied) == vars(repaired) and copied == repaired
     robot = sim["r"]
     robot.write_qvel([1e12], env_ids=[1])
     sim.update(2)
     assert [env for env, *_ in sim.diverged] == [1]
+    # Those of single environments add up to the counts of all.
+    assert sim.env_warnings(0) == {} and sum(sim.env_warnings(1).values()) > 0
+    assert all(sim.warnings[name] == count for name, count in sim.env_warnings(1).items())
     assert np.isfinite(robot.qpos).all()
     sim.reset([1])
     assert not sim.diverged

@@ -49,12 +49,15 @@ def blocks_of_the_page():
     return re.findall(r"```python\n(.*?)```", page, re.DOTALL)
 
 
-def test_programs_of_the_page(tmp_path, monkeypatch, capsys):
-    """The programs but those of tasks and Gymnasium, with fewer environments, smaller images and no window."""
+def test_programs_of_the_page(tmp_path, monkeypatch, capsys, display):
+    """The programs but those of tasks and Gymnasium, with fewer environments, smaller images and short times."""
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("DISPLAY", display)
     changes = {
         "num_envs=64": "num_envs=2",
         "ks.CameraCfg(": "ks.CameraCfg(width=32, height=24, ",
+        "playback.sim.open_window()": "timeout=0.2",
+        "range(100)": "range(2)",
         "sim.open_window()": "None",
         "sim.stream_to_foxglove()": 'sim.stream_to_foxglove("127.0.0.1:0")',
     }
@@ -62,7 +65,7 @@ def test_programs_of_the_page(tmp_path, monkeypatch, capsys):
     for old, new in changes.items():
         assert any(old in block for block in blocks), old
         blocks = [block.replace(old, new) for block in blocks]
-    first, configurations, recordings, segmentation = blocks
+    first, configurations, recordings, windows, segmentation = blocks
     names = {}
     exec(first, names)  # noqa: S102
     assert names["arm"].qpos.shape == (2, 6) and names["cam"]["depth"].shape == (2, 24, 32)
@@ -77,6 +80,8 @@ def test_programs_of_the_page(tmp_path, monkeypatch, capsys):
     names["sim"].reset()
     exec(recordings, names)  # noqa: S102
     assert names["stream"].clients == 0 and (tmp_path / "run.mcap").is_file()
+    exec(windows, names)  # noqa: S102
+    assert names["view"].wait(20)
     exec(segmentation, names)  # noqa: S102
     assert names["classes"].shape == (2, 24, 32) and "arm" in capsys.readouterr().out
 

@@ -220,3 +220,195 @@ def test_mimic_joints_of_embodichain():
     for joint, parent, factor, offset in zip(robot.mimic_ids, robot.mimic_parents, robot.mimic_multipliers, robot.mimic_offsets, strict=True):
         assert qpos[joint] == pytest.approx(factor * qpos[parent] + offset)
     sim.destroy()
+
+
+def spawned(cls, **fields):
+    """A rigid object of 2 kg of Isaac with a shape."""
+    from kinetoscope.compat.isaaclab import sim as sim_utils
+    from kinetoscope.compat.isaaclab.assets import RigidObjectCfg
+
+    body = {"rigid_props": sim_utils.RigidBodyPropertiesCfg(), "mass_props": sim_utils.MassPropertiesCfg(mass=2.0)}
+    spawn = getattr(sim_utils, cls)(radius=0.2, height=0.6, **body, **fields)
+    return RigidObjectCfg(prim_path="{ENV_REGEX_NS}/Body", spawn=spawn)
+
+
+# Moments of inertia about x and z for 2 kg, radius 0.2 m and height 0.6 m. A capsule is a cylinder with two half balls at its ends.
+CYLINDER, BALL = np.pi * 0.2**2 * 0.6, 4 / 3 * np.pi * 0.2**3
+M_CYLINDER, M_BALL = 2 * CYLINDER / (CYLINDER + BALL), 2 * BALL / (CYLINDER + BALL)
+MOMENTS = {
+    "CylinderCfg": (2 * (3 * 0.2**2 + 0.6**2) / 12, 2 * 0.2**2 / 2),
+    "CapsuleCfg": (
+        M_CYLINDER * (3 * 0.2**2 + 0.6**2) / 12
+        + M_BALL * (0.4 * 0.2**2 + 0.3**2 + 2 * 0.3 * 3 / 8 * 0.2),
+        M_CYLINDER * 0.2**2 / 2 + M_BALL * 0.4 * 0.2**2,
+    ),
+    # About the center of mass, a quarter of the height above the base.
+    "ConeCfg": (2 * (3 / 20 * 0.2**2 + 3 / 80 * 0.6**2), 2 * 3 / 10 * 0.2**2),
+}
+
+
+@pytest.mark.parametrize("cls", MOMENTS)
+def test_shapes_with_an_axis_of_isaac(cls):
+    """Closed forms of the moments of inertia: the axis is z, and the height is that of Isaac."""
+    scene = isaac_scene(body=spawned(cls))
+    inertia = scene["body"].native.inertia[0]
+    around, along = MOMENTS[cls]
+    # MuJoCo orders principal moments from the largest.
+    np.testing.assert_allclose(inertia, [around, around, along], rtol=1e-6)
+    assert scene["body"].native.nominal_mass == 2.0
+    center = {"ConeCfg": -0.15}.get(cls, 0.0)
+    np.testing.assert_allclose(scene["body"].native.center_of_mass[0], [0, 0, center], atol=1e-9)
+    scene.native.destroy()
+    with pytest.raises(NotImplementedError, match="axis"):
+        isaac_scene(body=spawned(cls, axis="X"))
+
+
+def test_tiled_cameras_and_lidars_of_isaac():
+    from kinetoscope.compat.isaaclab import sim as sim_utils
+    from kinetoscope.compat.isaaclab.assets import AssetBaseCfg
+    from kinetoscope.compat.isaaclab.sensors import CameraCfg, RayCasterCfg, TiledCamera, TiledCameraCfg, patterns
+
+    fields = {"prim_path": "{ENV_REGEX_NS}/Robot/base/cam", "width": 8, "height": 6, "data_types": ["rgb", "depth"]}
+    lidar = patterns.LidarPatternCfg(channels=3, vertical_fov_range=(-30.0, -10.0), horizontal_fov_range=(-90.0, 90.0), horizontal_res=45.0)
+    scene = isaac_scene(
+        ground=AssetBaseCfg(prim_path="/World/g", spawn=sim_utils.GroundPlaneCfg()),
+        tiled=TiledCameraCfg(**fields),
+        cam=CameraCfg(**{**fields, "prim_path": "{ENV_REGEX_NS}/Robot/base/cam_2"}),
+        lidar=RayCasterCfg(prim_path="{ENV_REGEX_NS}/Robot/base", pattern_cfg=lidar, mesh_prim_paths=["/World/g"]),
+    )
+    scene.native.update(2)
+    assert type(scene["tiled"]) is TiledCamera
+    for name in ("rgb", "depth"):
+        np.testing.assert_array_equal(np.asarray(scene["tiled"].data.output[name]), np.asarray(scene["cam"].data.output[name]))
+    # Judge: directions of the angles. Channels are elevations, azimuths change fastest, both ends of less than a turn belong to it.
+    elevation, azimuth = np.meshgrid(np.radians([-30, -20, -10]), np.radians([-90, -45, 0, 45, 90]), indexing="ij")
+    expected = np.stack([np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation)], axis=-1)
+    native = scene["robot"].native
+    turn = _poses.to_matrix(native.root_pose)[:, :3, :3]
+    hits, start = scene["lidar"].native["hits"], scene["lidar"].native["pos_w"]
+    seen = hits - start[:, None]
+    seen /= np.linalg.norm(seen, axis=-1, keepdims=True)
+    np.testing.assert_allclose(seen, np.einsum("nij,rj->nri", turn, expected.reshape(-1, 3)), atol=1e-6)
+    scene.native.destroy()
+
+
+def test_delayed_actuators_of_isaac():
+    """Targets arrive after the delay in physics steps, which each reset draws for each environment."""
+    from kinetoscope.compat.isaaclab.actuators import DelayedPDActuatorCfg, IdealPDActuatorCfg
+    from kinetoscope.compat.isaaclab.orbit_assets.anymal import ANYMAL_C_CFG
+
+    def robot_cfg(**delays):
+        gains = {"stiffness": 40.0, "damping": 2.0, "effort_limit": 80.0}
+        actuators = {
+            "late": DelayedPDActuatorCfg(joint_names_expr=[".*HAA", ".*HFE"], **gains, **delays),
+            "prompt": IdealPDActuatorCfg(joint_names_expr=[".*KFE"], **gains),
+        }
+        return ANYMAL_C_CFG.replace(prim_path="{ENV_REGEX_NS}/Robot", actuators=actuators)
+
+    scene = isaac_scene(robot_cfg(min_delay=3, max_delay=3))
+    native = scene["robot"].native
+    late = [not name.endswith("KFE") for name in native.joint_names]
+    assert (native.delay[:, late] == 3).all() and (native.delay[:, ~np.array(late)] == 0).all()
+    start = native.qf.copy()
+    native.set_qpos_target(native.qpos + 0.3)
+    # A step computes its efforts from the targets at its beginning: the first one has those of joints without a delay.
+    changed = []
+    for _ in range(5):
+        scene.native.update()
+        changed.append(np.abs(native.qf - start).min(axis=0) > 5.0)
+    assert not np.array(changed)[:3, late].any() and np.array(changed)[3, late].all()
+    assert np.array(changed)[0, ~np.array(late)].all()
+    scene.native.destroy()
+    scene = isaac_scene(robot_cfg(min_delay=1, max_delay=4))
+    robot, drawn = scene["robot"], []
+    for _ in range(60):
+        robot.reset([1])
+        assert (robot.native.delay[:, late] == robot.native.delay[:, :1]).all()
+        drawn.append(robot.native.delay[:, 0].tolist())
+    # The other environment keeps its own. All delays occur: 60 draws miss one of four with a chance of 4 * 0.75**60 = 1e-7.
+    assert len({row[0] for row in drawn}) == 1 and {row[1] for row in drawn} == {1, 2, 3, 4}
+    scene.native.destroy()
+    with pytest.raises(ks.ConfigError, match=r"actuators\['late'\]: min_delay is 2 and max_delay is 1"):
+        isaac_scene(robot_cfg(min_delay=2, max_delay=1))
+
+
+def test_selections_of_entities_of_isaac():
+    from kinetoscope.compat.isaaclab.managers import SceneEntityCfg
+
+    scene = isaac_scene()
+    names = scene["robot"].joint_names
+    for fields, attribute, ids, found in (
+        ({}, "joint", slice(None), None),
+        ({"joint_names": "LF_HAA"}, "joint", [names.index("LF_HAA")], ["LF_HAA"]),
+        ({"joint_names": [".*HAA"]}, "joint", [at for at, name in enumerate(names) if name.endswith("HAA")], [name for name in names if name.endswith("HAA")]),
+        ({"joint_names": ["RH_HAA", "LF_HAA"], "preserve_order": True}, "joint", [names.index("RH_HAA"), names.index("LF_HAA")], ["RH_HAA", "LF_HAA"]),
+        ({"joint_names": [".*"]}, "joint", slice(None), names),
+        ({"joint_ids": [2, 0]}, "joint", [2, 0], [names[2], names[0]]),
+        ({"joint_ids": 1}, "joint", [1], [names[1]]),
+        ({"body_names": "base"}, "body", [scene["robot"].body_names.index("base")], ["base"]),
+    ):  # fmt: skip
+        entity = SceneEntityCfg(name="robot", **fields)
+        entity.resolve(scene)
+        assert getattr(entity, f"{attribute}_ids") == ids and getattr(entity, f"{attribute}_names") == found, fields
+    for fields, text in (
+        ({"name": "robt"}, "no entity 'robt'; known names: robot"),
+        ({"name": "robot", "joint_names": "LF_HAB"}, "LF_HAB"),
+        ({"name": "robot", "joint_names": "LF_HAA", "joint_ids": [5]}, "differ"),
+    ):
+        with pytest.raises(ValueError, match=text):
+            SceneEntityCfg(**fields).resolve(scene)
+    scene.native.destroy()
+
+
+def test_groups_and_convex_pieces_of_embodichain(tmp_path):
+    from kinetoscope.compat.embodichain.lab.sim import SimulationManager, SimulationManagerCfg
+    from kinetoscope.compat.embodichain.lab.sim.cfg import RigidObjectCfg, RigidObjectGroupCfg
+    from kinetoscope.compat.embodichain.lab.sim.shapes import CubeCfg, MeshCfg, SphereCfg
+
+    sim = SimulationManager(SimulationManagerCfg(num_envs=2))
+    cubes = {
+        "a": RigidObjectCfg(shape=CubeCfg(size=[0.1] * 3), init_pos=[1, 0, 0.5]),
+        "b": RigidObjectCfg(shape=SphereCfg(radius=0.1), init_pos=[2, 0, 0.5]),
+        "c": RigidObjectCfg(shape=CubeCfg(size=[0.2] * 3), init_pos=[3, 0, 0.5]),
+    }
+    group = sim.add_rigid_object_group(RigidObjectGroupCfg(uid="toys", rigid_objects=cubes))
+    assert sim.get_rigid_object_group("toys") is group and sim.get_rigid_object_group_uid_list() == ["toys"]
+    assert (group.uid, group.num_objects, group.native.names) == ("toys", 3, ["toys.a", "toys.b", "toys.c"])
+    start = np.asarray(group.get_local_pose()).copy()
+    np.testing.assert_allclose(start[..., 0], [[1, 2, 3]] * 2)
+    assert np.asarray(group.get_local_pose(to_matrix=True)).shape == (2, 3, 4, 4)
+    sim.update(step=10)
+    assert (np.asarray(group.body_data.lin_vel)[..., 2] < -0.5).all() and np.asarray(group.body_data.vel).shape == (2, 3, 6)
+    # Matrices and rows, of selected objects and environments.
+    moved = np.array(start[:, :1])
+    moved[..., 2] = 2.0
+    group.set_local_pose(_poses.to_matrix(moved[1:]), env_ids=[1], obj_ids=[2])
+    heights = np.asarray(group.get_local_pose())[..., 2]
+    assert heights[1, 2] == 2.0 and (np.delete(heights.ravel(), 5) < 0.5).all()
+    group.clear_dynamics([0])
+    assert not np.asarray(group.body_data.vel)[0].any() and np.asarray(group.body_data.vel)[1].any()
+    group.reset()
+    np.testing.assert_allclose(np.asarray(group.get_local_pose()), start, atol=1e-6)
+    for cfg, error, text in (
+        (RigidObjectGroupCfg(uid="x", folder_path="meshes"), NotImplementedError, "folder_path"),
+        (RigidObjectGroupCfg(rigid_objects=cubes), ks.ConfigError, "uid"),
+        (RigidObjectGroupCfg(uid="x"), ks.ConfigError, "at least 1 object"),
+    ):
+        with pytest.raises(error, match=text):
+            sim.add_rigid_object_group(cfg)
+    # A mesh of two cubes apart: one hull fills the gap, pieces do not. A ball falls between them.
+    corners = [(x, y, z) for x in (0, 1) for y in (0, 1) for z in (0, 1)]
+    faces = [(1, 2, 4), (1, 4, 3), (5, 7, 8), (5, 8, 6), (1, 5, 6), (1, 6, 2), (3, 4, 8), (3, 8, 7), (1, 3, 7), (1, 7, 5), (2, 6, 8), (2, 8, 4)]
+    lines = [f"v {x + 2 * cube} {y} {z}" for cube in (0, 1) for x, y, z in corners]
+    lines += [f"f {a + 8 * cube} {b + 8 * cube} {c + 8 * cube}" for cube in (0, 1) for a, b, c in faces]
+    (tmp_path / "gap.obj").write_text("\n".join(lines))
+    for pieces, (low, high) in ((1, (1.0, 1.4)), (2, (0.05, 0.15))):
+        own = SimulationManager(SimulationManagerCfg())
+        shape = MeshCfg(fpath=str(tmp_path / "gap.obj"), max_convex_hull_num=pieces)
+        own.add_rigid_object(RigidObjectCfg(uid="gap", shape=shape, body_type="static"))
+        ball = own.add_rigid_object(RigidObjectCfg(uid="ball", shape=SphereCfg(radius=0.1), init_pos=[1.5, 0.5, 1.3]))
+        own.update(step=200)
+        height = np.asarray(ball.get_local_pose())[0, 2]
+        assert low < height < high, (pieces, height)
+        own.destroy()
+    sim.destroy()

@@ -21,12 +21,44 @@ arm = sim.add_robot(ks.bundled_robot("sr5"))
 """
 
 
-def test_ctrl_c_ends_update():
-    code = SCENE.format(threads=2) + (
-        "import time\nprint('ready', flush=True)\n"
-        "try:\n    sim.update(10_000_000)\nexcept KeyboardInterrupt:\n    print('interrupted', time.time(), sim.time[0] > 0)\n"
+# Calls that take minutes, and what is true after they were interrupted.
+LONG_CALLS = {
+    "update": ("sim.update(10_000_000)", "sim.time[0] > 0"),
+    "update_for": ("sim.update_for(100_000.0)", "sim.time[0] > 0"),
+    # The simulation does not change, and one row has more steps than a block.
+    "rollout": ("sim.rollout(np.zeros((1, 200_000, 6)))", "sim.time[0] == 0"),
+    "verify_recording": ("replayed.verify_recording('run.npz')", "replayed.time[0] > 0"),
+    "step": ("task.step(np.zeros((64, 6)))", "not stepped() and task.reset()[0].shape == (64, 6)"),
+    "play": ("ks.Playback('short.npz', sim).play()", "sim.time[0] == 0"),
+}
+PREPARED = {
+    "verify_recording": (
+        "one = {'num_envs': 1, 'threads': 1, 'ground': None}\n"
+        "def simulation():\n    own = ks.SimulationManager(one)\n    own.add_robot(ks.bundled_robot('sr5'))\n    return own\n"
+        "recorded, replayed = simulation(), simulation()\n"
+        "with recorded.record('run.npz'):\n    recorded.update(60_000)\n"
+    ),
+    "step": (
+        "place = {'place': {'type': 'joint_pos_rel'}}\n"
+        "task = ks.Task(sim, {'decimation': 1_000_000, 'observations': {'policy': place}, 'rewards': {'alive': {'type': 'is_alive', 'weight': 1.0}},\n"
+        "    'actions': {'push': {'type': 'joint_positions', 'robot': 'sr5', 'joints': ['.*']}}})\n"
+        "task.reset()\n"
+        "def stepped():\n"
+        "    try:\n        return task.step(np.zeros((64, 6)))\n"
+        "    except ks.ArgumentError as error:\n        assert 'reset' in str(error)\n"
+    ),
+    "play": "with ks.SimulationManager(threads=1) as short:\n    short.add_rigid_object(uid='a')\n    with short.record('short.npz'):\n        short.update(500)\nsim = ks.SimulationManager(threads=1)\nsim.add_rigid_object(uid='a')\n",
+}
+
+
+@pytest.mark.parametrize("name", LONG_CALLS)
+def test_ctrl_c_ends_long_calls(name, tmp_path):
+    call, after = LONG_CALLS[name]
+    code = SCENE.format(threads=2) + "import time\nimport numpy as np\n" + PREPARED.get(name, "") + (
+        "print('ready', flush=True)\n"
+        f"try:\n    {call}\nexcept KeyboardInterrupt:\n    late = time.time()\n    print('interrupted', late, {after})\n"
     )
-    process = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True)
+    process = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True, cwd=tmp_path)
     try:
         assert process.stdout.readline() == "ready\n"
         time.sleep(1.0)

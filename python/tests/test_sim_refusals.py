@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from conftest import virtual_display
 
 import kinetoscope as ks
 from kinetoscope import _accepted
@@ -105,6 +106,69 @@ def test_none_is_refused_for_fields_that_need_a_value(tmp_path):
     sim = ks.SimulationManager()
     camera = {"type": "camera", "width": 8, "height": 8, "extrinsics": {"parent": None}}
     sim.add_sensor("camera", camera)
+
+
+NAN, INFINITY = float("nan"), float("inf")
+
+
+@pytest.mark.parametrize(
+    ("call", "text"),
+    [
+        (lambda world: world["image_window"].wait(NAN), "timeout: NaN is not a time"),
+        (lambda world: world["image_window"].wait(-1.0), "timeout: -1 is not a time"),
+        (lambda world: world["image_window"].show(np.zeros((4, 4, 3))), "uint8.*float64"),
+        (lambda world: world["image_window"].show(np.zeros((4, 4), np.uint8)), "height, width, 4"),
+        (lambda world: world["image_window"].show(np.zeros((0, 4, 3), np.uint8)), "height, width, 4"),
+        (lambda world: ks.ImageWindow(size=(0, 5), display=":0"), "no pixels"),
+        (lambda world: world["window"].wait(NAN), "timeout: NaN is not a time"),
+        (lambda world: world["playback"].play(timeout=NAN), "timeout: NaN is not a time"),
+        (lambda world: world["playback"].frame_at(NAN), "nan is not a time"),
+        (lambda world: world["viewer"].seek(INFINITY), "inf is not a finite time"),
+        (lambda world: world["viewer"].set_speed(NAN), "NaN is not from 0.001 to 1000"),
+        (lambda world: world["terrain"].height_at(NAN, 0.0), r"\(NaN, 0\) is not a point"),
+        (lambda world: world["sim"].update_for(NAN), "seconds is NaN"),
+        (lambda world: world["sim"].update_for(-0.01), "seconds is -0.01"),
+        (lambda world: world["sim"].update_for(0.015), "seconds is 0.015; it must be a whole number of physics_dt"),
+        (lambda world: world["sim"].serve(speed=NAN), "speed: NaN is not from 0.001 to 1000"),
+        (lambda world: world["sim"].serve(cfg={"speed": {"factor": 0.0}}), "speed: 0 is not from 0.001 to 1000"),
+        (lambda world: world["sim"].serve(max_fps=NAN), "max_fps: NaN is not a number of images per second"),
+        (lambda world: world["sim"].serve(max_fps=0.0), "max_fps: 0 is not a number of images per second"),
+        (lambda world: world["sim"].serve(jpeg_quality=0), "jpeg_quality: 0 is not from 1 to 100"),
+        (lambda world: world["sim"].open_window(speed=NAN, display=world["display"]), "speed: NaN is not from"),
+        (lambda world: world["sim"].open_window(size=(0, 4), display=world["display"]), "no pixels"),
+        (lambda world: world["sim"].screenshot(eye=[NAN, 0, 0], target=[0, 0, 0]), "finite"),
+        (lambda world: world["sim"].screenshot(env=1), "1"),
+        (lambda world: world["sim"].record(world["folder"] / "a.npz", period_steps=0), "period_steps"),
+        (lambda world: world["sim"].record(world["folder"] / "a", "overview", format="images", overview_fps=NAN), "rate is NaN"),
+        (lambda world: world["sim"].env_warnings(1), "environment 1"),
+        (lambda world: world["recorder"].note("a", env=1), "1"),
+        (lambda world: world["camera"].pose_w("open-gl"), '"ros", "opengl" or "world"'),
+        (lambda world: world["sim"].set_camera_view([0, 0, NAN], [0, 0, 0]), "finite"),
+        (lambda world: world["sim"].show(width=0), "width"),
+    ],
+)  # fmt: skip
+def test_numbers_without_a_meaning_are_refused(call, text, nan_world):
+    """A time of NaN was no wait at all, and a negative one too."""
+    with pytest.raises(ks.KinetoscopeError, match=text):
+        call(nan_world)
+
+
+@pytest.fixture(scope="module")
+def nan_world(tmp_path_factory):
+    with virtual_display() as display:
+        folder = tmp_path_factory.mktemp("nan")
+        sim = ks.SimulationManager(threads=1)
+        camera = sim.add_sensor("camera", ks.CameraCfg(width=4, height=3))
+        terrain = sim.add_terrain(heights=[[0, 1], [1, 2]])
+        sim.add_rigid_object(uid="cube")
+        with sim.record(folder / "recorded.npz"):
+            sim.update(2)
+        yield {
+            "sim": sim, "display": display, "folder": folder, "camera": camera, "terrain": terrain, "viewer": sim.viewer(),
+            "window": sim.open_window(display=display, speed=None), "image_window": ks.ImageWindow(display=display),
+            "playback": ks.Playback(folder / "recorded.npz", sim), "recorder": sim.record(folder / "b.npz"),
+        }  # fmt: skip
+        sim.destroy()
 
 
 def test_misspelt_attributes_are_refused():

@@ -13,14 +13,24 @@ import pytest
 import kinetoscope as ks
 
 
+def program():
+    """Path of the command ``kinetoscope``."""
+    path = os.environ.get("KINETOSCOPE_CLI")
+    if not path or not Path(path).is_file():
+        pytest.fail("set KINETOSCOPE_CLI to the command kinetoscope, built for the MuJoCo of the package")
+    return path
+
+
+def environment():
+    """Environment variables with which the command finds MuJoCo."""
+    folder = Path(__import__("importlib.util").util.find_spec("mujoco").submodule_search_locations[0])
+    return {**os.environ, "LD_LIBRARY_PATH": str(folder)}
+
+
 def command(*arguments):
     """Runs the command ``kinetoscope``."""
-    program = os.environ.get("KINETOSCOPE_CLI")
-    if not program or not Path(program).is_file():
-        pytest.fail("set KINETOSCOPE_CLI to the command kinetoscope, built for the MuJoCo of the package")
-    folder = Path(__import__("importlib.util").util.find_spec("mujoco").submodule_search_locations[0])
-    environment = {**os.environ, "LD_LIBRARY_PATH": str(folder)}
-    return subprocess.run([program, *arguments], capture_output=True, text=True, timeout=120, env=environment, check=False)
+    arguments = [program(), *arguments]
+    return subprocess.run(arguments, capture_output=True, text=True, timeout=120, env=environment(), check=False)
 
 
 def test_states_are_those_of_rust(tmp_path):

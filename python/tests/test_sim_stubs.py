@@ -23,15 +23,17 @@ def run(*command):
 @pytest.fixture
 def strict(tmp_path):
     """The layers for scripts of other simulators take tensors and arrays of any kind: they are not checked. Libraries of
-    reinforcement learning may be missing, and their classes have types or not."""
+    reinforcement learning and of devices may be missing, and their classes have types or not."""
     file = tmp_path / "mypy.ini"
-    libraries = ["stable_baselines3", "rsl_rl", "tensordict", "skrl", "torch", "torchrl", "ray"]
+    libraries = ["stable_baselines3", "rsl_rl", "tensordict", "skrl", "torch", "torchrl", "ray", "warp", "mujoco_warp", "mujoco"]
     sections = {
         "mypy": "strict = true",
         "mypy-kinetoscope.compat.*": "ignore_errors = true",
         "mypy-kinetoscope.rl.*": "disallow_subclassing_any = false\ndisallow_untyped_calls = false",
+        # Kernels of Warp are functions with a decorator.
+        "mypy-kinetoscope.warp.*": "disallow_untyped_decorators = false",
         ",".join(f"mypy-{name}.*" if name == libraries[0] else f"{name}.*" for name in libraries): (
-            "ignore_missing_imports = true\nfollow_imports = skip"
+            "ignore_missing_imports = true\nfollow_imports = skip\nfollow_imports_for_stubs = true"
         ),
     }
     file.write_text("\n".join(f"[{name}]\n{text}" for name, text in sections.items()))

@@ -20,6 +20,7 @@ use kinetoscope_sim::{EnvId, SimulationManager};
 use serde_json::Value;
 use std::fmt;
 use std::path::Path;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Numbers of repeated steps and of reproduced values, and the first difference, of a replay.
 #[derive(Clone, Debug, PartialEq)]
@@ -100,6 +101,16 @@ type SourceFn = fn(&SimulationManager, &str, &[usize]) -> Result<StreamSource>;
 /// The file is not a complete recording, lacks required targets, controls or steps, or is of another scene, another
 /// MuJoCo version or another time step. A difference is not an error, but a [`ReplayResult`].
 pub fn verify(sim: &mut SimulationManager, path: impl AsRef<Path>) -> Result<ReplayResult> {
+    verify_until(&AtomicBool::new(false), sim, path)
+}
+
+/// [`verify`] that another thread can end by setting `stop`, after the step that is running. The simulation then has a
+/// state of the recording.
+///
+/// # Errors
+/// Same as [`verify`], and [`Error::Interrupted`](kinetoscope_sim::Error::Interrupted) if `stop` was set before the last
+/// step.
+pub fn verify_until(stop: &AtomicBool, sim: &mut SimulationManager, path: impl AsRef<Path>) -> Result<ReplayResult> {
     let archive = RecordedArrays::open(path.as_ref())?;
     let dt = sim.cfg().physics_dt;
     if archive.metadata["physics_dt"].as_f64() != Some(dt) {
@@ -155,7 +166,7 @@ pub fn verify(sim: &mut SimulationManager, path: impl AsRef<Path>) -> Result<Rep
             return Err(archive.malformed(format!("it has no controls of {uid}: record Topic::MjcfState({uid:?})")));
         }
     }
-    Replay { archive, states, targets, steps }.run(sim)
+    Replay { archive, states, targets, steps }.run(stop, sim)
 }
 
 /// Number of environments of the recorded simulation, also those that were not recorded, from a NumPy archive or an
@@ -177,10 +188,13 @@ struct Replay {
 }
 
 impl Replay {
-    fn run(mut self, sim: &mut SimulationManager) -> Result<ReplayResult> {
+    fn run(mut self, stop: &AtomicBool, sim: &mut SimulationManager) -> Result<ReplayResult> {
         let mut verdict = ReplayResult { steps: 0, values: 0, difference: None };
         let mut row = 0;
         while row < self.steps.len() {
+            if stop.load(Ordering::Relaxed) {
+                return Err(kinetoscope_sim::Error::Interrupted.into());
+            }
             let step = self.steps[row];
             if step > verdict.steps as f64 {
                 self.apply_actions(sim, row)?;

@@ -10,6 +10,7 @@
 //! everything that determines a step.
 
 mod bodies;
+mod on_device;
 #[cfg(test)]
 mod patch_tests;
 mod reads;
@@ -22,6 +23,7 @@ use self::bodies::BodyCache;
 use crate::available_memory::available_memory;
 use crate::batch_error::BatchError;
 use crate::capture::CaptureRequest;
+use crate::device::DeviceMirror;
 use crate::drive::table::{DriveState, DriveTable};
 use crate::env::{SimEnv, Stage};
 use crate::row::{EnvRow, StoredRow};
@@ -43,6 +45,16 @@ struct Chunk {
     read_values: Vec<f64>,
     /// Motion of bodies that was read.
     bodies: BodyCache,
+    /// True if the device has all rows, because none was in use since.
+    is_on_device: bool,
+}
+
+impl Chunk {
+    /// Notes that rows may change.
+    fn expect_changes(&mut self) {
+        self.bodies.expect_changes();
+        self.is_on_device = false;
+    }
 }
 
 /// A chunk that a thread has locked.
@@ -67,6 +79,8 @@ pub struct Batch {
     running: Mutex<()>,
     /// Growths of buffers in the batches that this one replaces.
     earlier_growths: u64,
+    /// Device that steps the environments; `None` for the threads of this process.
+    device: Option<Mutex<DeviceMirror>>,
 }
 
 /// Working memory for reads while that of all threads is in use.
@@ -186,7 +200,12 @@ impl Batch {
                 row
             };
             let rows = (0..size).map(row).collect();
-            chunks.push(Mutex::new(Chunk { rows, read_values: Vec::new(), bodies: BodyCache::default() }));
+            chunks.push(Mutex::new(Chunk {
+                rows,
+                read_values: Vec::new(),
+                bodies: BodyCache::default(),
+                is_on_device: false,
+            }));
         }
         let threads = threads.min(count);
         let share = |t: usize| t * count / threads..(t + 1) * count / threads;
@@ -205,6 +224,7 @@ impl Batch {
             num_envs,
             running: Mutex::new(()),
             earlier_growths: 0,
+            device: None,
         })
     }
 
@@ -226,7 +246,12 @@ impl Batch {
 
     /// Does `count` MuJoCo steps in every environment. Diverged environments do not step.
     pub fn step(&mut self, count: u32) {
-        self.run_chunks(|workspace, taken| taken.for_each_env(workspace, count, |_, env, _| env.advance(count, None)));
+        let count = self.step_on_device(count, None);
+        if count > 0 {
+            self.run_chunks(|workspace, taken| {
+                taken.for_each_env(workspace, count, |_, env, _| env.advance(count, None));
+            });
+        }
     }
 
     /// Steps as [`step`](Self::step) does, and captures the quantities of `capture` in the last step. Calls `visit` for
@@ -238,6 +263,7 @@ impl Batch {
         stage: Stage,
         visit: impl Fn(usize, &SimEnv) + Sync,
     ) {
+        let count = self.step_on_device(count, capture);
         self.run_chunks(|workspace, taken| {
             taken.for_each_env(workspace, count, |i, env, _| {
                 env.advance(count, capture);
@@ -268,6 +294,7 @@ impl Batch {
         read: impl for<'e> Fn(&'e SimEnv) -> [&'e [f64]; K] + Sync,
         mut outs: [&mut [f64]; K],
     ) {
+        let count = self.step_on_device(count, None);
         let widths = self.read_at(0, Stage::Raw, |env| read(env).map(<[f64]>::len));
         for (out, width) in outs.iter().zip(widths) {
             assert!(out.len() == self.num_envs * width, "{} numbers for {} x {width}", out.len(), self.num_envs);
@@ -511,14 +538,14 @@ impl Batch {
     fn with_row<T>(&self, index: usize, act: impl FnOnce(&mut Box<EnvRow>) -> T) -> T {
         assert!(index < self.num_envs, "environment {index} of {}", self.num_envs);
         let mut chunk = lock(&self.chunks.chunks[index / self.chunks.chunk_size]);
-        chunk.bodies.expect_changes();
+        chunk.expect_changes();
         act(&mut chunk.rows[index % self.chunks.chunk_size])
     }
 
     /// Number of times buffers were doubled, in the working memory of all threads. It depends on the number of threads,
     /// and on which of them took an environment.
     pub fn buffer_growths(&self) -> u64 {
-        self.earlier_growths + lock(&self.spare_workspaces).origin.buffer_growths()
+        self.earlier_growths + lock(&self.spare_workspaces).origin.buffer_growths() + self.device_growths()
     }
 
     /// Counts the growths of `old`, which this batch replaces, as growths of this batch.
@@ -530,7 +557,7 @@ impl Batch {
 impl LockedChunk<'_> {
     /// Calls `act` for every row of the chunk, with its index in the chunk.
     fn for_each_row(&mut self, mut act: impl FnMut(usize, &mut Box<EnvRow>)) {
-        self.chunk.bodies.expect_changes();
+        self.chunk.expect_changes();
         self.chunk.rows.iter_mut().enumerate().for_each(|(k, row)| act(k, row));
     }
 
@@ -543,8 +570,8 @@ impl LockedChunk<'_> {
         steps: u32,
         mut act: impl FnMut(usize, &mut SimEnv, &mut Vec<f64>),
     ) {
-        let Chunk { rows, read_values, bodies } = &mut *self.chunk;
-        bodies.expect_changes();
+        self.chunk.expect_changes();
+        let Chunk { rows, read_values, .. } = &mut *self.chunk;
         for k in 0..rows.len() {
             // The next rows are fetched while this environment steps: first the row, then the arrays it points to.
             if let Some(next) = rows.get(k + 1) {

@@ -27,6 +27,9 @@ pub enum Error {
     /// The observer was removed, or is handling an event right now.
     #[error("this observer was removed, or is handling an event right now")]
     ObserverUnavailable,
+    /// Another thread ended the call by the flag that the caller had given.
+    #[error("the call was interrupted before its end")]
+    Interrupted,
     /// A closure of [`with_mujoco`](crate::SceneViewMut::with_mujoco) exchanged the data for data of another model, for
     /// instance with `std::mem::swap`.
     #[error(
@@ -37,6 +40,9 @@ pub enum Error {
         /// Index of the environment.
         env: usize,
     },
+    /// The physics of a device is not available, does not support the scene, or failed.
+    #[error(transparent)]
+    Device(#[from] crate::device::DeviceError),
     /// A URDF file, or the assembly of several, is invalid.
     #[error(transparent)]
     Urdf(#[from] UrdfError),

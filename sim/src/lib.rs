@@ -17,6 +17,7 @@
 //! | `drive` | joint drives: gains, drive laws, actuator models |
 //! | `mjcf`, `compile` | the MJCF document, its writer, and the compiled scene |
 //! | `env`, `batch`, `rollout` | one environment, N environments on worker threads, rollouts on copies |
+//! | `device` | the physics of all environments on a GPU |
 //! | `capture`, `gather`, `sensor_list` | quantities of a step, the arrays that sensors read, the sensors themselves |
 //! | `randomization`, `snapshot` | properties per environment, saved and restored states |
 //! | `visible`, `scene_view` | the scene that cameras and viewers render |
@@ -63,6 +64,7 @@ mod batch_error;
 mod body_pose;
 mod capture;
 mod compile;
+mod device;
 mod diverged;
 #[cfg(not(feature = "internals"))]
 mod drive;
@@ -109,6 +111,7 @@ mod warnings;
 mod wrenches;
 
 pub use batch_error::BatchError;
+pub use device::{Device, DeviceError, DeviceOpener, DevicePhysics, UnknownDevice, set_device_opener};
 pub use diverged::DivergedEnv;
 pub use drive::plan::PlanError;
 pub use drive::{ActuatorModel, DcMotor, DelayedPd, DriveCfg, DriveCfgError, DriveModel, DriveType, IdealPd, PerJoint};
@@ -121,7 +124,7 @@ pub use interactive_scene::{
 };
 pub(crate) use kinetoscope_scene::pattern;
 pub use light_cfg::{LightCfg, LightKindCfg};
-pub use manager::SimulationManager;
+pub use manager::{SimulationManager, update_until};
 pub use mjcf::document::{FrictionCone, Integrator};
 pub use mjcf::error::RobotMjcfError;
 pub use mjcf::part::PartError;
@@ -149,7 +152,7 @@ pub use randomization::{
     EnvProperties, EnvPropertiesMut, Properties, Property, Randomization, RandomizationError, RandomizationOp,
     RandomizationTerm,
 };
-pub use rollout::Rollout;
+pub use rollout::{Rollout, rollout_until};
 pub use scene_view::{SceneView, SceneViewMut};
 pub use sensor_list::SensorId;
 pub use shard::{Shard, ShardError};

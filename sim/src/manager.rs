@@ -2,6 +2,7 @@
 
 use crate::batch::Batch;
 use crate::compile::compile;
+use crate::device::{self, DeviceError, DeviceMirror, DeviceScene};
 use crate::diverged::DivergedEnv;
 use crate::entity_set::EntitySet;
 use crate::env::{EnvStatus, SimEnv, Stage};
@@ -30,7 +31,8 @@ use kinetoscope_scene::EnvScene;
 use kinetoscope_scene::StateFields;
 use kinetoscope_sensors::{Sensor, SensorCfg, SensorContext};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::time::Instant;
 
 /// Source of the serial numbers that bind a handle to the manager that created it.
 static NEXT_MANAGER: AtomicU64 = AtomicU64::new(0);
@@ -71,7 +73,10 @@ impl SimulationManager {
         }
         let entities = EntitySet::default();
         let pool = ThreadPool::new();
-        let simulation = compile(&cfg, &entities, &pool)?;
+        let mut simulation = compile(&cfg, &entities, &pool)?;
+        if let Some(physics) = device::open(cfg.device)? {
+            load_on_device(DeviceMirror::new(physics), &cfg, &entities, &mut simulation).map_err(|(error, _)| error)?;
+        }
         let serial = NEXT_MANAGER.fetch_add(1, Ordering::Relaxed);
         let sensors = SensorList::new(serial, cfg.substeps);
         let visuals = VisualCache::default();
@@ -209,6 +214,14 @@ impl SimulationManager {
     /// Compiles `contents` and replaces the simulation. On an error nothing changes.
     pub(crate) fn recompile_with(&mut self, contents: EntitySet, mut diagnostics: Vec<Diagnostic>) -> Result<()> {
         let mut simulation = compile(&self.cfg, &contents, &self.pool)?;
+        simulation.carry_properties(&self.simulation)?;
+        if let Some(device) = self.simulation.batch.take_device()
+            && let Err((error, device)) = load_on_device(device, &self.cfg, &contents, &mut simulation)
+        {
+            // The scene before is still there, and the device needs it again.
+            let restored = load_on_device(device, &self.cfg, &self.entities, &mut self.simulation);
+            return Err(restored.map_or_else(|(error, _)| error, |()| error).into());
+        }
         // Compiling repeats the earlier diagnostics of the robots: report only the new ones.
         let mut known = self.simulation.diagnostics.clone();
         for diagnostic in &simulation.diagnostics {
@@ -217,7 +230,6 @@ impl SimulationManager {
                 None => diagnostics.push(diagnostic.clone()),
             }
         }
-        simulation.carry_properties(&self.simulation)?;
         simulation.transfer_state_from(&self.simulation);
         self.simulation = simulation;
         mj::trim_heap();
@@ -245,6 +257,11 @@ impl SimulationManager {
     {
         let uid = uid.into();
         self.sensors.check(&uid, cfg.requires())?;
+        if self.simulation.batch.is_on_device() && cfg.requires().contains(StateFields::SENSORDATA) {
+            let (what, expected) =
+                (format!("sensor {uid:?}, which reads MuJoCo's own sensors"), "it needs the device cpu");
+            return Err(DeviceError::Unsupported { what, expected: expected.into() }.into());
+        }
         let context = SensorContext { name: uid.as_str().into(), ..self.sensor_context(cfg.requires()) };
         self.sensors.add(uid, cfg, &mut self.simulation, &context)
     }
@@ -532,3 +549,39 @@ impl SimulationManager {
 /// Largest number of steps in one block: it bounds the response time of the caller (Ctrl+C) and the lead of one
 /// environment over the others.
 const MAX_BLOCK_STEPS: u32 = 1000;
+
+/// Loads a compiled scene on a device, which then steps its environments. On an error, returns the device too.
+#[expect(clippy::result_large_err, reason = "the error returns the device")]
+fn load_on_device(
+    mut device: DeviceMirror,
+    cfg: &SimulationManagerCfg,
+    contents: &EntitySet,
+    simulation: &mut Simulation,
+) -> std::result::Result<(), (DeviceError, DeviceMirror)> {
+    let table = simulation.batch.read_row(0, |row| Arc::clone(row.drives.table()));
+    let loaded =
+        DeviceScene::new(cfg, contents, simulation).and_then(|scene| device.load(&scene, &table, cfg.num_envs));
+    match loaded {
+        Ok(()) => {
+            simulation.batch.set_device(device);
+            Ok(())
+        }
+        Err(error) => Err((error, device)),
+    }
+}
+
+/// [Steps](SimulationManager::update) all environments until another thread sets `stop`. Returns the number of steps done:
+/// all of them, or fewer if the flag was set. It is read before blocks of steps, each of about 50 ms or one step.
+pub fn update_until(sim: &mut SimulationManager, stop: &AtomicBool, steps: u32) -> u32 {
+    const LONGEST_BLOCK: f64 = 0.05;
+    let (mut done, mut block) = (0, 1);
+    while done < steps && !stop.load(Ordering::Relaxed) {
+        let (started, now) = (Instant::now(), block.min(steps - done));
+        sim.update(now);
+        done += now;
+        // At most twice as many steps as before, so that one fast block does not lead to a long one.
+        let per_step = started.elapsed().as_secs_f64() / f64::from(now);
+        block = ((LONGEST_BLOCK / per_step.max(1e-9)) as u32).clamp(1, block.saturating_mul(2));
+    }
+    done
+}

@@ -14,6 +14,7 @@ use crate::simulation::Simulation;
 use crate::snapshot::{EnvEntry, Snapshot};
 use kinetoscope_mujoco as mj;
 use ndarray::{Array3, ArrayView2, ArrayView3, ArrayViewMut2, AsArray, Ix3};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
 /// Result of a [rollout](SimulationManager::rollout). Row k belongs to the k-th selected environment.
@@ -85,7 +86,7 @@ fn without_welds(env: &SimEnv) -> mj::Model {
 
 /// Simulates one row in `env`, which has the model of the row: one physics step (`substeps` MuJoCo steps) for each row
 /// of `controls`. Writes qpos and qvel after that step to the same row of `states`. Returns the final state, and the
-/// error text of a diverged row.
+/// error text of a diverged row; `None` if `stop` was set.
 fn step_row(
     env: &mut SimEnv,
     row: &RolloutRow,
@@ -93,10 +94,14 @@ fn step_row(
     substeps: u32,
     controls: ArrayView2<'_, f64>,
     mut states: ArrayViewMut2<'_, f64>,
-) -> (EnvEntry, Option<String>) {
+    stop: &AtomicBool,
+) -> Option<(EnvEntry, Option<String>)> {
     env.drives = row.drives.clone();
     env.load_state(&row.start);
     for (values, mut state) in controls.rows().into_iter().zip(states.rows_mut()) {
+        if stop.load(Ordering::Relaxed) {
+            return None;
+        }
         apply_controls(env, columns, values.iter().copied());
         env.advance(substeps, None);
         env.reach(Stage::State);
@@ -107,7 +112,21 @@ fn step_row(
         EnvStatus::Running => None,
         EnvStatus::Diverged { step, reason } => Some(format!("step {step}: {reason}")),
     };
-    (EnvEntry { env: row.env, state: env.save_state(), overrides: Arc::default() }, reason)
+    Some((EnvEntry { env: row.env, state: env.save_state(), overrides: Arc::default() }, reason))
+}
+
+/// [Rollout](SimulationManager::rollout) that another thread can end by setting `stop`, after the steps that are running.
+///
+/// # Errors
+/// Same as [`SimulationManager::rollout`], and [`Error::Interrupted`] if `stop` was set before the last step.
+pub fn rollout_until<'c>(
+    sim: &SimulationManager,
+    stop: &AtomicBool,
+    controls: impl AsArray<'c, f64, Ix3>,
+    start: Option<&Snapshot>,
+    env_ids: Option<&[EnvId]>,
+) -> Result<Rollout> {
+    sim.run_rollout(stop, controls.into(), start, env_ids)
 }
 
 impl SimulationManager {
@@ -136,7 +155,16 @@ impl SimulationManager {
         start: Option<&Snapshot>,
         env_ids: Option<&[EnvId]>,
     ) -> Result<Rollout> {
-        let controls: ArrayView3<'_, f64> = controls.into();
+        self.run_rollout(&AtomicBool::new(false), controls.into(), start, env_ids)
+    }
+
+    fn run_rollout(
+        &self,
+        stop: &AtomicBool,
+        controls: ArrayView3<'_, f64>,
+        start: Option<&Snapshot>,
+        env_ids: Option<&[EnvId]>,
+    ) -> Result<Rollout> {
         let envs = env_list(env_ids, self.num_envs())?;
         let columns = columns(&self.simulation);
         self.check_controls(controls, envs.len(), columns.len())?;
@@ -151,12 +179,15 @@ impl SimulationManager {
             // With the model the copy was made of: a row with welds changes the model of the copy.
             let mut copy: Option<(&mj::Model, SimEnv)> = None;
             while let Some((k, ((row, states), result))) = next() {
+                if stop.load(Ordering::Relaxed) {
+                    return Ok(());
+                }
                 let mut env = match copy.take().filter(|(model, _)| model.ptr_eq(&row.model)) {
                     Some((_, env)) => env,
                     None => SimEnv::with_drives(&row.model, row.drives.clone())?,
                 };
                 let mine = controls.index_axis(ndarray::Axis(0), if controls.shape()[0] == 1 { 0 } else { k });
-                *result = Some(step_row(&mut env, row, &columns, substeps, mine, states));
+                *result = step_row(&mut env, row, &columns, substeps, mine, states, stop);
                 // A row that needed larger buffers drops its copy, so that the next row starts with small ones.
                 copy = (env.buffer_growths() == 0).then_some((&row.model, env));
             }
@@ -173,6 +204,9 @@ impl SimulationManager {
             })?;
             mine
         })?;
+        if results.iter().any(Option::is_none) {
+            return Err(Error::Interrupted);
+        }
         let (mut entries, mut diverged) = (Vec::with_capacity(envs.len()), Vec::new());
         for (k, (entry, reason)) in results.into_iter().flatten().enumerate() {
             let overrides = self.simulation.own_properties(entry.env, self.randomization_count[entry.env]);

@@ -2,6 +2,7 @@
 
 use crate::body_pose::BodyFrame;
 use crate::capture::{CaptureRequest, body_velocity};
+use crate::device::{DeviceError, DevicePhysics};
 use crate::env::{EnvStatus, Stage};
 use crate::error::{Error, Result};
 use crate::ids::{EnvId, env_list, env_mask};
@@ -47,6 +48,18 @@ impl<'a> SceneView<'a> {
     /// MJCF document that the shared model was compiled from, without properties of single environments.
     pub fn mjcf(&self) -> &'a str {
         &self.sim.simulation.xml
+    }
+
+    /// Error of the physics on a [device](crate::SimulationManagerCfg::device), after which all environments are frozen; always
+    /// `None` on the CPU.
+    pub fn device_failure(&self) -> Option<DeviceError> {
+        self.sim.simulation.batch.device_failure()
+    }
+
+    /// Calls `act` with the physics of the [device](crate::SimulationManagerCfg::device), for code that knows its type; `None` on
+    /// the CPU.
+    pub fn with_device<T>(&self, act: impl FnOnce(&dyn DevicePhysics) -> T) -> Option<T> {
+        self.sim.simulation.batch.with_device(act)
     }
 
     /// Entity and link of each value in the mask channel of cameras, in ascending order of the values, the same in all

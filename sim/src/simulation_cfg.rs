@@ -1,5 +1,6 @@
 //! Configuration of a simulation: sizes, physics, ground and lights of every environment.
 
+use crate::device::Device;
 use crate::error::{Error, Result};
 use crate::light_cfg::LightCfg;
 use crate::mjcf::document::{FrictionCone, Integrator, PhysicsOption};
@@ -15,6 +16,8 @@ use serde::{Deserialize, Serialize};
 pub struct SimulationManagerCfg {
     /// Number of environments.
     pub num_envs: usize,
+    /// Device of the physics: `cpu`, `cuda`, `cuda:N` with the number of a GPU, or `warp-cpu`.
+    pub device: Device,
     /// Physics time step \[s\]; MuJoCo's time step is `physics_dt / substeps`.
     pub physics_dt: f64,
     /// MuJoCo steps per `physics_dt`.
@@ -73,6 +76,7 @@ impl Default for SimulationManagerCfg {
     fn default() -> Self {
         Self {
             num_envs: 1,
+            device: Device::Cpu,
             physics_dt: 0.01,
             substeps: 1,
             gravity: Vector3::new(0.0, 0.0, -9.81),
@@ -120,6 +124,24 @@ impl SimulationManagerCfg {
             origin[1] = (j - (cols - 1) as f64 / 2.0) * space;
         }
         origins
+    }
+
+    /// Number of physics steps in a time \[s\], which must be a whole number of `physics_dt`.
+    ///
+    /// # Errors
+    /// The time is negative, is not a whole number of steps, or is more than `u32::MAX` steps.
+    pub fn steps_in(&self, seconds: f64) -> Result<u32> {
+        let steps = seconds / self.physics_dt;
+        let whole = steps.round();
+        // Tolerance for the quotient of two rounded numbers: 0.1 / 0.005 need not be 20.
+        if !((steps - whole).abs() <= 1e-6 && (0.0..=f64::from(u32::MAX)).contains(&whole)) {
+            return Err(Error::Config {
+                field: "seconds",
+                value: seconds.to_string(),
+                expected: "it must be a whole number of physics_dt, at most 4294967295 of them",
+            });
+        }
+        Ok(whole as u32)
     }
 
     /// Number of threads for rendering and ray casting: [`threads`](Self::threads), or the number of cores. Stepping

@@ -81,6 +81,11 @@ impl Wrenches {
         self.replace(Wrench { owner: (USER_FORCE_OWNER, body), body: mujoco_body, axes: None, force, torque });
     }
 
+    /// True if the direction of a wrench turns with a link.
+    pub(crate) fn has_link_axes(&self) -> bool {
+        self.list.iter().any(|wrench| wrench.axes.is_some())
+    }
+
     /// Enables or disables gravity compensation of bodies, by their indices in the model.
     pub(crate) fn set_gravity_compensation(&mut self, bodies: &[usize], weightless: bool) {
         self.gravity_compensated.retain(|body| !bodies.contains(body));

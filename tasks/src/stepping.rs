@@ -7,8 +7,9 @@ use crate::episode_rng::{EpisodeKey, EpisodeRng};
 use crate::error::{EnvError, Result};
 use crate::event::EventMode;
 use crate::step::{EndReason, EndedEpisode, Step, StepInfo};
-use kinetoscope_sim::{EnvId, StepResult};
+use kinetoscope_sim::{EnvId, Error, StepResult, update_until};
 use ndarray::{Array1, Array2, ArrayView2, AsArray, Axis, Ix2, Slice};
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Steps.
 impl Env {
@@ -27,7 +28,21 @@ impl Env {
     /// - A term fails, or returns an array of another shape or a number that is not finite. The step is then incomplete
     ///   and every environment has to be reset.
     pub fn step<'a>(&mut self, actions: impl AsArray<'a, f64, Ix2>) -> Result<Step> {
-        let actions = self.clamp_actions(actions.into())?;
+        self.checked_step(None, actions.into())
+    }
+
+    /// [`step`](Self::step) that another thread can end by setting `stop`, between its physics steps.
+    ///
+    /// # Errors
+    /// Same as [`step`](Self::step), and [`Error::Interrupted`] if `stop` was set before the last physics step. The step is
+    /// then incomplete and every environment has to be reset.
+    pub fn step_until<'a>(&mut self, stop: &AtomicBool, actions: impl AsArray<'a, f64, Ix2>) -> Result<Step> {
+        self.checked_step(Some(stop), actions.into())
+    }
+
+    /// A step, which ends with an error once `stop` is set.
+    fn checked_step(&mut self, stop: Option<&AtomicBool>, actions: ArrayView2<'_, f64>) -> Result<Step> {
+        let actions = self.clamp_actions(actions)?;
         if let Some(env) = self.episodes.iter().position(|row| row.phase == Phase::NoEpisode) {
             return Err(EnvError::ResetFirst { env });
         }
@@ -36,7 +51,7 @@ impl Env {
         {
             return Err(EnvError::EpisodeEnded { env });
         }
-        let step = self.advance(actions);
+        let step = self.advance(stop, actions);
         if step.is_err() {
             self.episodes.iter_mut().for_each(|row| row.phase = Phase::NoEpisode);
         }
@@ -64,13 +79,13 @@ impl Env {
         Ok(Array2::from_shape_fn(actions.dim(), |(env, k)| self.action_space.clamp(k, used(env, k))))
     }
 
-    fn advance(&mut self, actions: Array2<f64>) -> Result<Step> {
+    fn advance(&mut self, stop: Option<&AtomicBool>, actions: Array2<f64>) -> Result<Step> {
         let n = self.num_envs();
         // Environments that only begin an episode in this step, in the mode `NextStep`. They take part in the physics
         // steps like the others, and are reset afterwards.
         let beginning: Vec<usize> = (0..n).filter(|&env| self.episodes[env].phase == Phase::Ended).collect();
         self.state.previous_actions = std::mem::replace(&mut self.state.actions, actions);
-        self.apply_actions()?;
+        self.apply_actions(stop)?;
         self.state.episode_steps.iter_mut().for_each(|steps| *steps += 1);
         let (terminated, truncated, reasons) = self.check_terminations()?;
         let reward_terms = self.compute_rewards()?;
@@ -118,7 +133,7 @@ impl Env {
     }
 
     /// Applies the actions and does the physics steps.
-    fn apply_actions(&mut self) -> Result<()> {
+    fn apply_actions(&mut self, stop: Option<&AtomicBool>) -> Result<()> {
         let apply = |present: &mut TaskState, again: bool| -> Result<()> {
             let mut first = 0;
             for term in &self.terms.actions {
@@ -136,8 +151,16 @@ impl Env {
         if self.terms.actions.iter().any(|term| term.every_physics_step) {
             present.sim_mut().update(1);
             for _ in 1..self.cfg.decimation {
+                if stop.is_some_and(|stop| stop.load(Ordering::Relaxed)) {
+                    return Err(Error::Interrupted.into());
+                }
                 apply(present, true)?;
                 present.sim_mut().update(1);
+            }
+        } else if let Some(stop) = stop {
+            // In blocks, which cost more than one call for all steps.
+            if update_until(present.sim_mut(), stop, self.cfg.decimation) < self.cfg.decimation {
+                return Err(Error::Interrupted.into());
             }
         } else {
             present.sim_mut().update(self.cfg.decimation);

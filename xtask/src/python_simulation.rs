@@ -57,6 +57,11 @@ const LEARNING: [&str; 11] = [
     "tensorboardX>=1.9",
 ];
 
+/// MuJoCo Warp with all that it needs beside `mujoco-core`, whose version `mujoco` on PyPI does not allow, so they are
+/// installed without their own requirements.
+const WARP: [&str; 7] =
+    ["mujoco-warp==4.0.0", "warp-lang==1.19.0", "absl-py", "etils", "fsspec", "typing_extensions", "zipp"];
+
 /// Builds the wheel and returns its path.
 ///
 /// # Errors
@@ -102,8 +107,11 @@ pub(crate) fn test(repo: &Repo) -> XtaskResult {
 
 /// Runs the tests in an environment with the installed wheels.
 fn run_tests(repo: &Repo, ready: &Prepared, python: &Path) -> XtaskResult {
-    // The requirements of the wheels are those that are installed.
-    Cmd::new(python).args(["-m", "pip", "--disable-pip-version-check", "check"]).run()?;
+    let with_warp = has_warp(python);
+    if !with_warp {
+        // The requirements of the wheels are those that are installed. MuJoCo Warp names another `mujoco`.
+        Cmd::new(python).args(["-m", "pip", "--disable-pip-version-check", "check"]).run()?;
+    }
     let mut tests = Cmd::new(python).args(["-m", "pytest", "-q", "-p", "no:cacheprovider", "."]);
     if !is_with_torch(python) {
         println!(
@@ -113,6 +121,10 @@ fn run_tests(repo: &Repo, ready: &Prepared, python: &Path) -> XtaskResult {
         tests = tests.env("KINETOSCOPE_TESTS_WITHOUT_TORCH", "1");
     }
     let mut left_out = Vec::new();
+    if !with_warp {
+        println!("note: the tests of MuJoCo Warp run with NumPy {}", NUMPY[1]);
+        left_out.push("not needs_warp");
+    }
     if !has_learning(python) {
         println!("note: the tests of the libraries of kinetoscope.rl are left out; {WANTS_TORCH}=1 installs them");
         left_out.push("not needs_learning");
@@ -128,6 +140,8 @@ fn run_tests(repo: &Repo, ready: &Prepared, python: &Path) -> XtaskResult {
         .args(["-m", &left_out.join(" and ")])
         .current_dir(repo.root.join("python/tests"))
         .env("KINETOSCOPE_CLI", ready.binary("kinetoscope"))
+        // Compiled kernels of MuJoCo Warp.
+        .env("WARP_CACHE_PATH", repo.target.join("warp-cache"))
         .env("PYTHONDONTWRITEBYTECODE", "1")
         .run()
 }
@@ -136,6 +150,11 @@ fn run_tests(repo: &Repo, ready: &Prepared, python: &Path) -> XtaskResult {
 /// `create_sensor` does not run on.
 fn is_with_torch(python: &Path) -> bool {
     Cmd::new(python).args(["-c", "import torch"]).quiet().succeeds() && !has_learning(python)
+}
+
+/// True if MuJoCo Warp is installed.
+fn has_warp(python: &Path) -> bool {
+    Cmd::new(python).args(["-c", "import importlib.util as u; assert u.find_spec('mujoco_warp')"]).quiet().succeeds()
 }
 
 /// True if the libraries of [`LEARNING`] are installed.
@@ -180,6 +199,10 @@ fn environment(repo: &Repo, numpy: &str) -> XtaskResult<PathBuf> {
     if !is_ready() {
         let core = format!("mujoco-core=={}", wheel::VERSION);
         create(&venv, &[&[core.as_str(), &format!("numpy=={numpy}")][..], &PACKAGES].concat())?;
+    }
+    if numpy == NUMPY[1] && !has_warp(&python) {
+        let install = ["-m", "pip", "install", "--no-input", "--disable-pip-version-check", "--quiet", "--no-deps"];
+        Cmd::new(&python).args(install).args(WARP).run()?;
     }
     if env::var_os(WANTS_TORCH).is_some() {
         let torch = ["torch==2.15.0"];

@@ -33,7 +33,7 @@ fn create_robot() {
     let mut lines = text.lines();
     for line in [
         "Creating simulation...",
-        "note: --gpu-id has no effect here: physics and cameras run on the CPU; --threads chooses how many cores",
+        "note: --gpu-id has no effect here: --device cuda:N chooses the GPU of the physics, and cameras run on the CPU",
         "Loading robot...",
         "Robot created successfully with 17 joints",
         "Starting simulation...",

@@ -389,6 +389,7 @@ impl Context {
             "u8" | "u16" | "u32" | "u64" | "usize" | "i32" | "i64" => "int".into(),
             "bool" => "bool".into(),
             "String" => "str".into(),
+            "Device" => "str".into(),
             "PathBuf" => "str | os.PathLike[str]".into(),
             "Pose" | "PerJoint" => {
                 self.note(&name);

@@ -21,6 +21,7 @@ from . import cfg, errors  # noqa: E402
 from ._sim import (  # noqa: E402
     FoxgloveServer,
     IkResult,
+    ImageWindow,
     MjcfPart,
     Playback,
     Recorder,
@@ -51,6 +52,7 @@ from ._sim import (  # noqa: E402
 )
 from .assets import asset, bundled_robot  # noqa: E402
 from .cfg import *  # noqa: E402, F403
+from .diagnostics import Diagnostic  # noqa: E402
 from .errors import *  # noqa: E402, F403
 
 if TYPE_CHECKING:
@@ -83,8 +85,10 @@ def __dir__() -> list[str]:
 
 __all__ = [
     "BatchRenderer",
+    "Diagnostic",
     "FoxgloveServer",
     "IkResult",
+    "ImageWindow",
     "MjcfPart",
     "Playback",
     "Recorder",

@@ -45,15 +45,30 @@ def _fields() -> dict[str, dict[str, bool]]:
     }
 
 
+@cache
+def _optional_arguments() -> set[str]:
+    """Names of arguments of the constructors of variants that may be None, such as ``hull`` of ``ObjectShape.mesh``."""
+    variants = [getattr(cfg, name) for name in cfg.__all__]
+    functions = [
+        function.__func__
+        for cls in variants
+        if isinstance(cls, type) and not dataclasses.is_dataclass(cls)
+        for function in vars(cls).values()
+        if isinstance(function, staticmethod)
+    ]
+    types = [item for function in functions for item in function.__annotations__.items()]
+    return {name for name, kind in types if "None" in str(kind).split(" | ")}
+
+
 def is_optional(kind: str, field: str) -> bool:
     """True if the field of a configuration may be None. ``kind`` is a type of scene files, ``"simulation"``, or ``""``
-    for a dict inside another, whose type is unknown: then the fields of this name in all classes count. True for an
-    unknown field, whose name Rust refuses."""
+    for a dict inside another, whose type is unknown: then the fields of this name in all classes and variants count. True
+    for an unknown field, whose name Rust refuses."""
     classes = _fields()
     if kind in classes:
         return classes[kind].get(field, True)
     named = [fields[field] for fields in classes.values() if field in fields]
-    return not named or any(named)
+    return not named or any(named) or field in _optional_arguments()
 
 
 def _own_class(value: Any) -> type | None:
@@ -120,6 +135,28 @@ def _mistake_in(field: str, value: Any, owner: type | None) -> str | None:
         if inner is not None:
             return f"{field}.{inner}"
     return None
+
+
+def of_table(kind: str, table: Mapping[str, Any]) -> Any:
+    """The configuration of type ``kind`` in a table of Rust, which has all fields except those without a value."""
+    cls = _classes()[kind]
+    return cls(**{field.name: _value_of(field, table.get(field.name)) for field in dataclasses.fields(cls)})
+
+
+def _value_of(field: dataclasses.Field[Any], value: Any) -> Any:
+    """A value of a table in the form that the class has: parts with a class, sequences as in the default, None."""
+    from ._sim import _NONE_IS_FALSE
+
+    if value is False and field.name in _NONE_IS_FALSE:
+        return None
+    if isinstance(value, Mapping):
+        named = re.findall(r"\w+", str(field.type))
+        kinds = [kind for kind, cls in _classes().items() if cls.__name__ in named]
+        return of_table(kinds[0], value) if len(kinds) == 1 else value
+    if isinstance(value, list):
+        items = [_value_of(field, item) for item in value]
+        return tuple(items) if isinstance(field.default, tuple) else items
+    return value
 
 
 def not_a_sensor(kind: str) -> str | None:

@@ -58,6 +58,7 @@ from .cfg import (
     WeldCfg,
     WindowCfg,
 )
+from .diagnostics import Diagnostic
 from .notebook import Frame
 
 _PlainTopic: TypeAlias = Literal["everything", "engine_states", "task_results", "overview", "events"]
@@ -90,6 +91,7 @@ _Handle: TypeAlias = MjcfPart | RigidObject | RigidObjectGroup | Robot | Sensor 
 __all__ = [
     "FoxgloveServer",
     "IkResult",
+    "ImageWindow",
     "MjcfPart",
     "Playback",
     "Recorder",
@@ -112,7 +114,7 @@ __all__ = [
     "__version__",
     "_default_fields",
     "_default_uid",
-    "_panic",
+    "_panic_next",
     "_set_assets",
     "asset_path",
     "bundled_robot",
@@ -137,7 +139,8 @@ def bundled_robot(name: str) -> str:
     """Configuration of a bundled robot as the text of a scene file with this one entity."""
 def inspect(cfg: InspectCfg | _Fields | None = None, **fields: Any) -> dict[str, Any]:
     """Masses, links, joints, mass matrix and gravity torques of a robot at joint positions, without a simulation: a
-    dict of plain values. ``cfg`` is an ``InspectCfg`` or a dict of its fields; keyword arguments replace fields.
+    dict of plain values. ``cfg`` is an ``InspectCfg`` or a dict of its fields; keyword arguments replace fields. A
+    number that is not finite, such as an unlimited effort, is None.
     """
 def json_schema() -> dict[str, Any]:
     """JSON Schema (draft 7) of scene files, a dict, for completion and checks in editors."""
@@ -169,7 +172,7 @@ def recording_topics(path: str | os.PathLike[str]) -> list[tuple[str, list[str]]
 def _default_fields(name: str) -> str: ...
 def _default_uid(kind: str) -> str: ...
 def _set_assets(folder: str | os.PathLike[str]) -> bool: ...
-def _panic(simulation: SimulationManager, write: bool) -> None: ...
+def _panic_next(requested: bool) -> bool: ...
 
 @final
 class FoxgloveServer:
@@ -192,6 +195,34 @@ class FoxgloveServer:
         """Disconnects all clients and stops listening."""
 
 @final
+class ImageWindow:
+    """A window for images that the program computes, such as the channels of a camera. It has a thread of its own,
+    so it stays responsive while the program computes. It closes with ``close``, or when the object is dropped.
+    """
+
+    def __new__(cls, title: str | None = None, size: Sequence[int] | NDArray[Any] | None = None, *, display: str | None = None) -> Self: ...
+    @property
+    def failure(self) -> str | None:
+        """Error that closed the window, such as a lost display; None if it is open or was closed as intended."""
+    @property
+    def frame_count(self) -> int:
+        """Number of frames sent to the display."""
+    @property
+    def is_open(self) -> bool:
+        """True while the window is open."""
+    def __enter__(self, /) -> Self: ...
+    def __exit__(self, /, *_exception: object) -> None: ...
+    def __repr__(self) -> str: ...
+    def close(self, /) -> None:
+        """Requests the window to close, without waiting."""
+    def show(self, /, image: ArrayLike) -> None:
+        """Replaces the image and returns at once: uint8, shape (height, width, 4) or (height, width, 3). It is
+        scaled to fit into the window. Without effect after the window was closed.
+        """
+    def wait(self, /, timeout: float | None = None) -> bool:
+        """Waits until the window is closed, at most ``timeout`` seconds, and returns True if it is."""
+
+@final
 class Playback:
     """Playback of a recording: ``seek`` puts the simulation ``sim`` into the state of a recorded frame."""
 
@@ -209,6 +240,11 @@ class Playback:
     def __repr__(self) -> str: ...
     def frame_at(self, /, time: float) -> int:
         """Index of the last frame at or before a time [s]; 0 before the first."""
+    def play(self, /, window: Window | None = None, timeout: float | None = None) -> None:
+        """Shows the recording in the windows and browser views of ``sim``, from the first frame in real time.
+        Viewers pause it, seek, show single frames and change the speed. Returns when ``window`` is closed, after
+        ``timeout`` seconds, or with ``KeyboardInterrupt`` on Ctrl+C. Other calls of ``sim`` wait meanwhile.
+        """
     def seek(self, /, frame: int) -> None:
         """Shows a frame, by its index in ``times``."""
 
@@ -283,14 +319,26 @@ class SimulationManager:
     def body_names(self) -> list[str]:
         """Names of all bodies, in the order in which sensors and viewers number them."""
     @property
+    def cfg(self) -> SimulationManagerCfg:
+        """Configuration of the simulation with all its values: a ``SimulationManagerCfg``. It is a copy: changes
+        have no effect.
+        """
+    @property
     def control_names(self) -> list[str]:
         """Names of the columns of controls in ``rollout``."""
     @property
-    def diagnostics(self) -> list[str]:
-        """Everything repaired, ignored or unusual in the files and configurations of all entities."""
+    def diagnostics(self) -> list[Diagnostic]:
+        """Everything repaired, ignored or unusual in the files and configurations of all entities: texts with the
+        attributes ``kind``, ``message``, ``file`` and ``line``.
+        """
     @property
     def diverged(self) -> list[tuple[int, int, str]]:
         """Environments that are frozen after an invalid state, with the step and the reason."""
+    @property
+    def engine_states(self) -> tuple[_Array, _Array]:
+        """Positions and velocities of all joints in MuJoCo's layout, shapes (num_envs, nq) and (num_envs, nv).
+        ``state_names`` names the columns.
+        """
     @property
     def env_origins(self) -> _Array:
         """Origins of the environments in the overview [m], shape (num_envs, 3). Poses do not contain them."""
@@ -300,6 +348,12 @@ class SimulationManager:
     @property
     def mjcf(self) -> str:
         """The MJCF document of the simulation."""
+    def device_array(self, /, name: str) -> Any:
+        """An array of the physics on a device, without a copy: a ``warp.array`` with a row per environment, for
+        ``warp.to_torch`` and DLPack. Names: ``qpos``, ``qvel``, ``qacc_warmstart``, ``act`` and ``qacc``. Raises
+        ``DeviceError`` on the device ``cpu``.
+        """
+
     @property
     def num_envs(self) -> int:
         """Number of environments."""
@@ -354,10 +408,12 @@ class SimulationManager:
         """
     def destroy(self, /) -> None:
         """Frees the simulation. Later calls of it and of its handles raise ``DestroyedError``."""
-    def dump(self, /, folder: str | os.PathLike[str]) -> list[str]:
+    def dump(self, /, folder: str | os.PathLike[str]) -> list[Diagnostic]:
         """Writes the merged robots, the MJCF documents for both MuJoCo versions and the meshes to a folder. Returns
         diagnostics for everything left out.
         """
+    def env_warnings(self, /, env: int) -> dict[str, int]:
+        """Counts of MuJoCo's warnings in one environment, by name."""
     def exclude_collision(self, /, one: str | _Handle, other: str | _Handle) -> None:
         """Excludes collisions between two entities or bodies from now on: names such as ``"arm/link"``, or handles."""
     @classmethod
@@ -370,6 +426,10 @@ class SimulationManager:
         """
     def keys(self, /) -> list[str]:
         """Names of the entities, in the order in which they were added."""
+    def nominal_property(self, /, property: Property, name: str) -> list[float]:
+        """Value of a property of a link, object or joint in the model as it was compiled, which ``reset_properties``
+        returns to.
+        """
     def open_window(self, /, title: str | None = None, size: Sequence[int] | NDArray[Any] | None = None, *, speed: float | None = 1.0, display: str | None = None, cfg: WindowCfg | _Fields | None = None) -> Window:
         """Opens a window that shows the simulation while it steps, in real time unless ``speed`` is another factor,
         or None for no limit. ``cfg`` is a ``WindowCfg``, in place of the other arguments. Raises ``ViewerError``
@@ -401,7 +461,8 @@ class SimulationManager:
     def rollout(self, /, controls: ArrayLike, start: Snapshot | None = None, env_ids: _Envs = None) -> tuple[_Array, Snapshot, list[tuple[int, str]]]:
         """Simulates copies of environments: controls, shape (num_envs, steps, columns of ``control_names``). Returns
         the states after each step, shape (num_envs, steps, columns of ``state_names``), the final states as a
-        snapshot, and the diverged rows with their reasons. The simulation does not change.
+        snapshot, and the diverged rows with their reasons. The simulation does not change. Ctrl+C ends the call
+        after the current step.
         """
     @overload
     def screenshot(self, /, path: None = None, *, size: Sequence[int] | None = None, env: int | None = None, eye: _Numbers | None = None, target: _Numbers | None = None, cfg: ScreenshotCfg | _Fields | None = None) -> _Array:
@@ -444,12 +505,16 @@ class SimulationManager:
         """Steps all environments ``steps`` times. Ctrl+C ends the call after at most one block of steps, also while
         a viewer pauses the simulation or sets its speed.
         """
+    def update_for(self, /, seconds: float) -> None:
+        """Steps all environments by a time [s], a whole number of ``physics_dt``. Ctrl+C ends it as it ends
+        ``update``.
+        """
     def viewer(self, /) -> Viewer:
         """Adds a viewer that pauses, steps and paces the simulation from the program."""
     def verify_recording(self, /, path: str | os.PathLike[str]) -> dict[str, Any]:
         """Replays a recording (``.npz`` or ``.mcap``) in this simulation, built as the recorded one was, and
         compares the states bit by bit. Returns a dict: ``identical``, ``steps``, ``values``, and ``difference`` (a
-        text, or None).
+        text, or None). Ctrl+C ends the call after the current step.
         """
 
 @final
@@ -555,6 +620,7 @@ class Task:
         """One step with actions, shape (num_envs, columns). Returns observations, rewards, terminated, truncated and
         a dict of ``final_observations``, ``reward_terms`` (num_envs, terms) and ``ended`` (episodes that ended:
         dicts). By default, an environment whose episode ends begins the next one in the same step (``autoreset``).
+        Ctrl+C ends a long step, after which all environments have to be reset.
         """
 
 @final
@@ -611,14 +677,16 @@ class Topic:
 class Viewer:
     """A viewer that is a program, made by ``SimulationManager.viewer``: it pauses, steps and paces the simulation,
     while another thread steps it by ``update``, which handles commands after each step. Its pause and speed end with
-    ``close``.
+    ``close``. While ``Playback.play`` shows a recording, the commands are for the recording.
     """
 
     @property
     def state(self) -> dict[str, Any]:
         """State of the simulation when it last published one, at most 30 times per second: a dict of ``steps`` since
         the simulation was created, ``paused``, ``speed`` (None for no limit), ``measured_speed`` (simulated seconds
-        per second, or None) and ``refusal``, the reason of the last refused command, or None.
+        per second, or None), ``refusal``, the reason of the last refused command, or None, and ``timeline``, a dict
+        of ``time``, ``start`` and ``end`` [s] while ``Playback.play`` shows a recording, otherwise None. ``steps``
+        is then the index of the frame.
         """
     def __enter__(self, /) -> Self: ...
     def __exit__(self, /, *_exception: object) -> None: ...
@@ -631,6 +699,10 @@ class Viewer:
         """Resets an environment, or all, after the next step."""
     def resume(self, /) -> None:
         """Resumes the simulation, whichever viewer paused it."""
+    def seek(self, /, time: float) -> None:
+        """Shows the frame of a recording at a time [s], while ``Playback.play`` shows it; a time outside shows its
+        first or last frame.
+        """
     def set_speed(self, /, speed: float | None) -> None:
         """Sets the speed: simulated seconds per second, from 0.001 to 1000, or None for no limit."""
     def step(self, /, steps: int = 1) -> None:

@@ -15,7 +15,7 @@ _Joints: TypeAlias = str | Sequence[str] | int | Sequence[int] | NDArray[Any] | 
 _Patterns: TypeAlias = str | Sequence[str]
 _Numbers: TypeAlias = Sequence[float] | NDArray[Any]
 _Fields: TypeAlias = Mapping[str, Any]
-_Axes: TypeAlias = Literal["ros", "opengl", "open_gl", "world"]
+_Axes: TypeAlias = Literal["ros", "opengl", "world"]
 _Level: TypeAlias = Literal["instance", "link", "semantic"]
 _Side: TypeAlias = Literal["left", "right"]
 _Out = TypeVar("_Out", bound=_Array)
@@ -243,8 +243,18 @@ class Robot:
     def drive_types(self) -> list[list[str]]:
         """Meaning of the gains of each drive, rows of texts, shape (num_envs, dof)."""
     @property
+    def driven_joint_ids(self) -> list[int]:
+        """Indices of the joints with a drive, for which ``set_qpos_target`` sets targets. Passive joints and joints
+        that follow another have none. A drive that ``set_drive_type`` switched to ``"none"`` counts.
+        """
+    @property
     def external_wrenches(self) -> _Array:
         """External forces and torques on the links, shape (num_envs, links, 6)."""
+    @property
+    def fixed_link_ids(self) -> list[int]:
+        """Indices of the links that are fixed in the world: the base is fixed, and no joint moves the link. They do
+        not collide with the ground.
+        """
     @property
     def friction(self) -> _Array:
         """Dry friction of the joints [N m or N], shape (num_envs, dof)."""
@@ -483,17 +493,33 @@ class Sensor:
     def columns(self) -> list[str]:
         """Names of the bodies, joints or other items that the values belong to."""
     @property
+    def debug_vis(self) -> bool:
+        """True if the markers of the sensor are shown in views and in images with ``draw_markers``."""
+    @property
+    def due_in(self) -> int | None:
+        """Physics steps until the sensor next measures, delivers a delayed measurement or opens its shutter in any
+        environment, at least 1; None for a sensor that failed.
+        """
+    @property
     def env_ids(self) -> list[int]:
         """Environments that a camera sees, one for each row of its channels."""
     @property
     def filters(self) -> list[str]:
         """Names along the third axis of the matrix channels of a contact sensor."""
     @property
+    def force_stamps(self) -> _Array:
+        """Times of the current forces, efforts and accelerations of a numeric sensor [s], shape (num_envs,). They
+        are of the beginning of the last step, and ``stamps`` of its end.
+        """
+    @property
     def image_shape(self) -> tuple[int, int]:
         """Height and width of the images of a camera [pixels]."""
     @property
     def intrinsic_matrices(self) -> _Array:
         """Intrinsic matrices of a camera [pixels], shape (num_envs, 3, 3)."""
+    @property
+    def is_attached(self) -> bool:
+        """True if a camera is attached to a body."""
     @property
     def kind(self) -> str:
         """Type of the sensor in scene files, such as ``"camera"``."""
@@ -509,6 +535,9 @@ class Sensor:
     @property
     def units(self) -> dict[str, str]:
         """Units of the numeric channels, by name; empty for numbers without a unit."""
+    @property
+    def update_period(self) -> float:
+        """Time between measurements [s], after rounding to whole physics steps."""
     def __contains__(self, name: object, /) -> bool: ...
     def __eq__(self, other: object, /) -> bool: ...
     def __getitem__(self, name: str, /) -> _Array: ...
@@ -522,7 +551,7 @@ class Sensor:
         """Capture times of the latest delivered images of a camera [s], shape (num_envs,)."""
     @property
     def stamp_history(self) -> _Array:
-        """Capture times of the images in the history of a camera [s], newest first, shape (num_envs, history); 0 for
+        """Capture times of the measurements in the history [s], newest first, shape (num_envs, history); 0 for
         entries that are not filled yet.
         """
     def camera_info(self, /, env: int = 0, side: _Side | None = None) -> dict[str, Any]:

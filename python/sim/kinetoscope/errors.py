@@ -6,6 +6,7 @@ __all__ = [
     "ArgumentError",
     "ConfigError",
     "DestroyedError",
+    "DeviceError",
     "FileError",
     "ForeignHandleError",
     "ForkError",
@@ -72,6 +73,10 @@ class ViewerError(KinetoscopeError, RuntimeError):
 
 class DestroyedError(KinetoscopeError, RuntimeError):
     """The simulation was destroyed, or the task was closed."""
+
+
+class DeviceError(KinetoscopeError, RuntimeError):
+    """The physics of a device is not available, does not support the scene, or failed."""
 
 
 class ForeignHandleError(KinetoscopeError, ValueError):

@@ -9,6 +9,7 @@ use numpy::{PyArray, PyArray1, PyArrayDyn, PyArrayMethods, PyUntypedArrayMethods
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use pyo3::types::{PyBool, PyDict, PyInt, PyList, PySequence, PyString, PyTuple};
+use std::time::Duration;
 
 /// Numbers of an argument: an array, a list, a tensor, anything that NumPy accepts. Missing leading axes are added, so
 /// that one row stands for all environments.
@@ -92,6 +93,24 @@ pub(crate) fn integers(obj: &Bound<'_, PyAny>, name: &str) -> PyResult<ArrayD<i3
     Ok(values.mapv(|value| value as i32))
 }
 
+/// Bytes of an argument, such as a color image: an array of uint8, of any shape.
+pub(crate) fn bytes(obj: &Bound<'_, PyAny>, name: &str) -> PyResult<ArrayD<u8>> {
+    let mut converted = numpy(obj, name, "")?;
+    let dtype: String = converted.getattr("dtype")?.str()?.extract()?;
+    if dtype != "uint8" || converted.getattr("ndim")?.extract::<usize>()? >= MAX_AXES {
+        let problem = format!("expected an array of uint8, such as the channel color of a camera, not of {dtype}");
+        return Err(Failure::argument(name, problem).into());
+    }
+    let is_readable = converted.cast::<PyArrayDyn<u8>>().is_ok_and(is_plain);
+    if !is_readable {
+        // A copy has the layout that the array type of Rust assumes.
+        converted = converted.call_method0("copy")?;
+    }
+    let array = converted.cast::<PyArrayDyn<u8>>().map_err(|error| Failure::argument(name, error))?;
+    let borrowed = array.try_readonly().map_err(|error| Failure::argument(name, error))?;
+    Ok(borrowed.as_array().to_owned())
+}
+
 /// Indices, or a mask of the items that are selected.
 #[derive(Debug)]
 pub(crate) enum Indices {
@@ -159,6 +178,15 @@ pub(crate) fn indices(obj: &Bound<'_, PyAny>, name: &str) -> PyResult<Indices> {
     let numbers = numbers.as_array();
     let ids = numbers.iter().map(|&i| usize::try_from(i).map_err(|_| out_of_range(i)));
     ids.collect::<PyResult<_>>().map(Indices::Ids)
+}
+
+/// Longest wait for a limit in seconds; no limit without one, and for infinity.
+pub(crate) fn time_limit(seconds: Option<f64>, name: &str) -> PyResult<Duration> {
+    match seconds {
+        None | Some(f64::INFINITY) => Ok(Duration::MAX),
+        Some(seconds) => Ok(Duration::try_from_secs_f64(seconds)
+            .map_err(|_| Failure::argument(name, format!("{seconds} is not a time of at least 0 s")))?),
+    }
 }
 
 /// Environments of an argument; `None` for all.

@@ -3,7 +3,7 @@
 use crate::arguments::{array, env_indices};
 use crate::channels::Instant;
 use crate::errors::{Class, Failure};
-use crate::sensor::{Sensor, camera_of, id_of, intrinsics_of, not_a_camera};
+use crate::sensor::{Sensor, camera_of, id_of, intrinsics_of, not_a_camera, sampled};
 use crate::shared::{detached, guarded};
 use crate::values::Values;
 use kinetoscope::ndarray::{Array1, Array2, Array3, Ix2};
@@ -98,11 +98,17 @@ impl Sensor {
         Ok(stamps.into_python(py))
     }
 
-    /// Capture times of the images in the history of a camera [s], newest first, shape (num_envs, history); 0 for entries
-    /// that are not filled yet.
+    /// Capture times of the measurements in the history [s], newest first, shape (num_envs, history); 0 for entries that are
+    /// not filled yet.
     #[getter]
     fn stamp_history<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        let stamps: Values<'_> = self.of_camera(py, |camera| Ok(camera.stamp_history().to_owned().into()))?;
+        let stamps: Values<'_> = self.shared.read(py, |sim| {
+            let sensor = sim.entities().sensor_by_uid(&self.uid)?;
+            Ok(match camera_of(sensor) {
+                Some(camera) => camera.stamp_history().to_owned().into(),
+                None => sampled(sensor, &self.uid)?.stamp_history().to_owned().into(),
+            })
+        })?;
         Ok(stamps.into_python(py))
     }
 }

@@ -4,9 +4,9 @@ use kinetoscope::assets::AssetNotFound;
 use kinetoscope::record::RecordError;
 use kinetoscope::robot::dynamics::DynamicsError;
 use kinetoscope::sensors::SensorError;
-use kinetoscope::sim::Error;
 use kinetoscope::sim::inspect::InspectError;
-use kinetoscope::viewer::{ScreenshotError, ServeError, WindowError};
+use kinetoscope::sim::{DeviceError, Error};
+use kinetoscope::viewer::{PlayError, ScreenshotError, ServeError, WindowError};
 use pyo3::prelude::*;
 use std::any::Any;
 
@@ -15,6 +15,7 @@ use std::any::Any;
 pub(crate) enum Class {
     Other,
     Config,
+    Device,
     Model,
     UnknownName,
     OutOfRange,
@@ -35,6 +36,7 @@ impl Class {
         match self {
             Self::Other => "KinetoscopeError",
             Self::Config => "ConfigError",
+            Self::Device => "DeviceError",
             Self::Model => "ModelError",
             Self::UnknownName => "UnknownNameError",
             Self::OutOfRange => "OutOfRangeError",
@@ -142,6 +144,7 @@ impl Class {
             | Error::Kinematics { .. }
             | Error::EntityType { .. } => Self::Argument,
             Error::Sensor { .. } | Error::SensorFault { .. } | Error::SensorRequires { .. } => Self::Sensor,
+            Error::Device(_) => Self::Device,
             Error::Snapshot(_) => Self::Snapshot,
             Error::File { .. } => Self::File,
             _ => Self::Other,
@@ -186,6 +189,7 @@ macro_rules! classes {
 
 classes! {
     RecordError => Recording,
+    PlayError => Recording,
     ServeError => Viewer,
     WindowError => Viewer,
     ScreenshotError => Viewer,
@@ -194,6 +198,7 @@ classes! {
     serde_json::Error => Internal,
     InspectError => Model,
     DynamicsError => Argument,
+    DeviceError => Device,
 }
 
 impl Failure {

@@ -9,6 +9,7 @@ mod arguments;
 mod calibration;
 mod cfg;
 mod channels;
+mod device;
 mod dynamics;
 mod errors;
 mod html;
@@ -46,19 +47,22 @@ fn _set_assets(folder: PathBuf) -> bool {
 #[pyfunction]
 fn bundled_robot(name: &str) -> PyResult<String> {
     use kinetoscope::assets;
-    let robot = match name {
-        "quadruped" => assets::quadruped(),
-        "sr5" => assets::sr5(),
-        "revo1_left" => assets::revo1_left(),
-        "sr5_with_hand" => assets::sr5_with_hand(),
-        other => {
-            let message = format!("unknown robot {other:?}; known names: quadruped, sr5, revo1_left, sr5_with_hand");
-            return Err(Failure::new(errors::Class::UnknownName, message).into());
-        }
-    };
-    let robot = robot.map_err(Failure::from)?;
-    let scene = kinetoscope::sim::SceneCfg::default().with(robot.uid.clone(), robot);
-    Ok(shared::guarded(|| Ok(scene.to_toml(&kinetoscope::sim::EntityTypes::default())?))?)
+    let text = shared::guarded(|| {
+        let robot = match name {
+            "quadruped" => assets::quadruped()?,
+            "sr5" => assets::sr5()?,
+            "revo1_left" => assets::revo1_left()?,
+            "sr5_with_hand" => assets::sr5_with_hand()?,
+            other => {
+                let message =
+                    format!("unknown robot {other:?}; known names: quadruped, sr5, revo1_left, sr5_with_hand");
+                return Err(Failure::new(errors::Class::UnknownName, message));
+            }
+        };
+        let scene = kinetoscope::sim::SceneCfg::default().with(robot.uid.clone(), robot);
+        Ok(scene.to_toml(&kinetoscope::sim::EntityTypes::default())?)
+    });
+    Ok(text?)
 }
 
 /// Version of the MuJoCo library that is loaded.
@@ -108,7 +112,8 @@ fn _default_fields(name: &str) -> PyResult<String> {
 }
 
 /// Masses, links, joints, mass matrix and gravity torques of a robot at joint positions, without a simulation: a dict of
-/// plain values. ``cfg`` is an ``InspectCfg`` or a dict of its fields; keyword arguments replace fields.
+/// plain values. ``cfg`` is an ``InspectCfg`` or a dict of its fields; keyword arguments replace fields. A number that is not
+/// finite, such as an unlimited effort, is None.
 #[pyfunction]
 #[pyo3(signature = (cfg=None, **fields))]
 fn inspect<'py>(
@@ -139,20 +144,16 @@ fn json_schema(py: Python<'_>) -> PyResult<Bound<'_, PyAny>> {
     py.import("json")?.call_method1("loads", (text,))
 }
 
-/// Panics, to test that a panic becomes an ``InternalError``.
+/// Makes the next call panic, or ends such a request, to test that a panic becomes an ``InternalError``. Returns True if
+/// there was a request.
 #[pyfunction]
-fn _panic(simulation: &Bound<'_, simulation::Simulation>, write: bool) -> PyResult<()> {
-    let shared = &simulation.get().shared;
-    let py = simulation.py();
-    if write {
-        shared.write(py, |_| panic!("requested by a test"))
-    } else {
-        shared.read(py, |_| panic!("requested by a test"))
-    }
+fn _panic_next(requested: bool) -> bool {
+    shared::request_panic(requested)
 }
 
 #[pymodule]
 fn _sim(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    kinetoscope::sim::set_device_opener(device::open);
     module.add_class::<simulation::Simulation>()?;
     module.add_class::<robot::Robot>()?;
     module.add_class::<robot::IkResult>()?;
@@ -172,6 +173,7 @@ fn _sim(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<recording::FoxgloveServer>()?;
     module.add_class::<viewer::Server>()?;
     module.add_class::<viewer::Window>()?;
+    module.add_class::<viewer::ImageWindow>()?;
     module.add_class::<viewer_control::Viewer>()?;
     module.add_function(wrap_pyfunction!(asset_path, module)?)?;
     module.add_function(wrap_pyfunction!(bundled_robot, module)?)?;
@@ -186,7 +188,7 @@ fn _sim(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(_set_assets, module)?)?;
     module.add_function(wrap_pyfunction!(_default_uid, module)?)?;
     module.add_function(wrap_pyfunction!(_default_fields, module)?)?;
-    module.add_function(wrap_pyfunction!(_panic, module)?)?;
+    module.add_function(wrap_pyfunction!(_panic_next, module)?)?;
     module.add("_NONE_IS_FALSE", cfg::NONE_IS_FALSE.to_vec())?;
     module.add("__version__", env!("CARGO_PKG_VERSION"))
 }

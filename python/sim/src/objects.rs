@@ -1,6 +1,7 @@
 //! Rigid objects, groups of them, terrains, attached MJCF files and welds.
 
 use crate::arguments::{array, envs, indices, patterns};
+use crate::errors::Failure;
 use crate::robot::{arrays, wrench_frame, writers};
 use crate::shared::{Shared, equal_handles};
 use kinetoscope::ndarray::{Ix1, Ix2, Ix3};
@@ -201,6 +202,9 @@ impl Terrain {
 
     /// Height at a point of the terrain frame [m]; None outside.
     fn height_at(&self, py: Python<'_>, x: f64, y: f64) -> PyResult<Option<f64>> {
+        if x.is_nan() || y.is_nan() {
+            return Err(Failure::argument("height_at", format!("({x}, {y}) is not a point")).into());
+        }
         self.shared.read(py, |sim| Ok(sim.entities().terrain(self.id).height_at([x, y])))
     }
 

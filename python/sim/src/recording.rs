@@ -1,22 +1,25 @@
 //! Recordings and replay.
 
-use crate::arguments::envs;
+use crate::arguments::{envs, time_limit};
 use crate::cfg;
 use crate::errors::{Class, Failure};
-use crate::shared::{Entity, Shared, detached, guarded};
+use crate::shared::{Entity, Shared, detached, guarded, interruptible};
 use crate::simulation::Simulation;
+use crate::viewer::Window;
 use kinetoscope::prelude::Record as _;
 use kinetoscope::record::{
     self, FieldSelector, Format, FoxgloveCfg, OverviewCfg, RecorderCfg, RecorderId, Recording, StreamToFoxglove as _,
     TimeSeries,
 };
-use kinetoscope::sim::EnvId;
+use kinetoscope::sim::{EnvId, SimulationManager};
+use kinetoscope::viewer::{Play as _, PlaybackSource};
 use numpy::{IntoPyArray, PyArray1};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyMapping, PyString};
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Instant;
 
 /// Selection of what is recorded.
 #[pyclass(frozen, module = "kinetoscope")]
@@ -254,9 +257,12 @@ impl Simulation {
     }
 
     /// Replays a recording (``.npz`` or ``.mcap``) in this simulation, built as the recorded one was, and compares the
-    /// states bit by bit. Returns a dict: ``identical``, ``steps``, ``values``, and ``difference`` (a text, or None).
+    /// states bit by bit. Returns a dict: ``identical``, ``steps``, ``values``, and ``difference`` (a text, or None). Ctrl+C ends
+    /// the call after the current step.
     fn verify_recording<'py>(&self, py: Python<'py>, path: PathBuf) -> PyResult<Bound<'py, PyDict>> {
-        let result = self.shared.write(py, |sim| Ok(record::replay::verify(sim, path)?))?;
+        let result = interruptible(py, |stop| {
+            self.shared.write_detached(|sim| Ok(record::replay::verify_until(stop, sim, path)?))
+        })?;
         let dict = PyDict::new(py);
         dict.set_item("identical", result.is_identical())?;
         dict.set_item("steps", result.steps)?;
@@ -436,10 +442,11 @@ impl Playback {
             }
             None => detached(py, || Ok(record::Playback::open(&recording, None)?))?,
         };
-        let entities = manager.entities();
-        let parts =
-            entities.mjcf_uids().into_iter().filter_map(|uid| Some((uid.to_string(), entities.mjcf_id(uid).ok()?)));
-        let parts: Vec<_> = parts.collect();
+        let parts = guarded(|| {
+            let entities = manager.entities();
+            let part = |uid: &str| Ok((uid.to_string(), entities.mjcf_id(uid)?));
+            entities.mjcf_uids().into_iter().map(part).collect::<Result<Vec<_>, Failure>>()
+        })?;
         let shared = Shared::new(manager);
         parts.into_iter().for_each(|(uid, id)| shared.register(&uid, Entity::Mjcf(id)));
         let sim = Py::new(py, Simulation { shared: Arc::clone(&shared) })?;
@@ -454,14 +461,14 @@ impl Playback {
 
     /// Times of the frames [s], shape (frames,).
     #[getter]
-    fn times<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        py.detach(|| self.lock().times().to_vec()).into_pyarray(py)
+    fn times<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        Ok(detached(py, || Ok(self.lock().times().to_vec()))?.into_pyarray(py))
     }
 
     /// Names of the joints that the recording has no positions of; they stay where they were.
     #[getter]
-    fn joints_without_data(&self, py: Python<'_>) -> Vec<String> {
-        py.detach(|| self.lock().joints_without_data().to_vec())
+    fn joints_without_data(&self, py: Python<'_>) -> PyResult<Vec<String>> {
+        detached(py, || Ok(self.lock().joints_without_data().to_vec()))
     }
 
     /// Shows a frame, by its index in ``times``.
@@ -480,16 +487,38 @@ impl Playback {
     }
 
     /// Index of the last frame at or before a time [s]; 0 before the first.
-    fn frame_at(&self, py: Python<'_>, time: f64) -> usize {
-        py.detach(|| self.lock().frame_at(time))
+    fn frame_at(&self, py: Python<'_>, time: f64) -> PyResult<usize> {
+        if time.is_nan() {
+            return Err(Failure::argument("time", "nan is not a time in seconds").into());
+        }
+        detached(py, || Ok(self.lock().frame_at(time)))
     }
 
-    fn __len__(&self, py: Python<'_>) -> usize {
-        py.detach(|| self.lock().times().len())
+    /// Shows the recording in the windows and browser views of ``sim``, from the first frame in real time. Viewers pause it, seek,
+    /// show single frames and change the speed. Returns when ``window`` is closed, after ``timeout`` seconds, or with
+    /// ``KeyboardInterrupt`` on Ctrl+C. Other calls of ``sim`` wait meanwhile.
+    #[pyo3(signature = (window=None, timeout=None))]
+    fn play(&self, py: Python<'_>, window: Option<&Bound<'_, Window>>, timeout: Option<f64>) -> PyResult<()> {
+        let (longest, started) = (time_limit(timeout, "timeout")?, Instant::now());
+        let window = window.map(|window| &window.get().inner);
+        interruptible(py, |stop| {
+            self.shared.write_detached(|sim| {
+                let mut playback = self.lock();
+                let mut goes_on = || {
+                    let is_open = window.is_none_or(kinetoscope::viewer::Window::is_open);
+                    is_open && started.elapsed() < longest && !stop.load(Ordering::Relaxed)
+                };
+                Ok(sim.play(&mut Frames(&mut playback), &mut goes_on)?)
+            })
+        })
     }
 
-    fn __repr__(&self, py: Python<'_>) -> String {
-        format!("<Playback of {} frames>", self.__len__(py))
+    fn __len__(&self, py: Python<'_>) -> PyResult<usize> {
+        detached(py, || Ok(self.lock().times().len()))
+    }
+
+    fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
+        Ok(format!("<Playback of {} frames>", self.__len__(py)?))
     }
 }
 
@@ -497,6 +526,19 @@ impl Playback {
     /// The playback. Its lock is held while a frame is shown, so callers do not hold the interpreter.
     fn lock(&self) -> MutexGuard<'_, record::Playback> {
         self.inner.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// Frames of a recording, for viewers.
+struct Frames<'p>(&'p mut record::Playback);
+
+impl PlaybackSource for Frames<'_> {
+    fn times(&self) -> &[f64] {
+        self.0.times()
+    }
+
+    fn show(&mut self, sim: &mut SimulationManager, frame: usize) -> Result<(), String> {
+        self.0.seek(sim, frame).map_err(|error| error.to_string())
     }
 }
 

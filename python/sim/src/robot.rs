@@ -9,7 +9,7 @@ use kinetoscope::robot::description::{Joint, Link, LinkId};
 use kinetoscope::robot::kinematics::{IkCfg, TipFrame};
 use kinetoscope::scene::Pose;
 use kinetoscope::scene::pose::from_row;
-use kinetoscope::sim::{DriveType, RobotId, WrenchFrame};
+use kinetoscope::sim::{DriveType, JointIndex, RobotId, WrenchFrame};
 use numpy::IntoPyArray;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -271,6 +271,28 @@ impl Robot {
     #[getter]
     fn mimic_joint_ids(&self, py: Python<'_>) -> PyResult<Vec<usize>> {
         self.shared.read(py, |sim| Ok(sim.robot(self.id).mimic_joint_ids().into_iter().map(|joint| joint.0).collect()))
+    }
+
+    /// Indices of the joints with a drive, for which ``set_qpos_target`` sets targets. Passive joints and joints that follow
+    /// another have none. A drive that ``set_drive_type`` switched to ``"none"`` counts.
+    #[getter]
+    fn driven_joint_ids(&self, py: Python<'_>) -> PyResult<Vec<usize>> {
+        self.shared.read(py, |sim| {
+            let robot = sim.robot(self.id);
+            let is_driven = |joint: &usize| robot.is_driven(JointIndex(*joint)).unwrap_or(false);
+            Ok((0..robot.dof()).filter(is_driven).collect())
+        })
+    }
+
+    /// Indices of the links that are fixed in the world: the base is fixed, and no joint moves the link. They do not collide with
+    /// the ground.
+    #[getter]
+    fn fixed_link_ids(&self, py: Python<'_>) -> PyResult<Vec<usize>> {
+        self.shared.read(py, |sim| {
+            let robot = sim.robot(self.id);
+            let is_fixed = |link: &usize| robot.is_link_fixed(LinkId(*link)).unwrap_or(false);
+            Ok((0..robot.link_names().len()).filter(is_fixed).collect())
+        })
     }
 
     /// For each joint: the joint that drives it, the multiplier and the offset. An independent joint drives itself.

@@ -4,7 +4,7 @@ use crate::arguments::integers;
 use crate::cfg;
 use crate::errors::{Class, Failure};
 use crate::sensor::{Sensor, camera_of, not_a_camera};
-use crate::shared::Shared;
+use crate::shared::{Shared, detached, guarded};
 use crate::simulation::Simulation;
 use crate::values::Values;
 use kinetoscope::ndarray::{Axis, Ix3};
@@ -61,7 +61,8 @@ impl Segmentation {
             dict.set_item("mask_ids", &segment.mask_ids)?;
             Ok(dict)
         };
-        self.inner.segments(level_of(level)?).iter().map(row).collect()
+        let level = level_of(level)?;
+        guarded(|| Ok(self.inner.segments(level)))?.iter().map(row).collect()
     }
 
     /// Segment ids of images of the channel ``mask``, int32, in the same shape: 0 where nothing was hit, -1 for mask ids of
@@ -69,7 +70,7 @@ impl Segmentation {
     #[pyo3(signature = (mask, level="instance"))]
     fn segment<'py>(&self, py: Python<'py>, mask: &Bound<'_, PyAny>, level: &str) -> PyResult<Bound<'py, PyAny>> {
         let (mask, level) = (integers(mask, "mask")?, level_of(level)?);
-        let segments = py.detach(|| self.inner.segment(level, mask.view()));
+        let segments = detached(py, || Ok(self.inner.segment(level, mask.view())))?;
         Ok(Values::from(segments).into_python(py))
     }
 
@@ -81,7 +82,7 @@ impl Segmentation {
         let wrong = Failure::argument("mask", format!("shape {:?}; expected (num_envs, height, width)", mask.shape()));
         let images = if is_single { mask.insert_axis(Axis(0)) } else { mask };
         let images = images.into_dimensionality::<Ix3>().map_err(|_| wrong)?;
-        let colors = py.detach(|| self.inner.colorize(level, images.view()));
+        let colors = detached(py, || Ok(self.inner.colorize(level, images.view())))?;
         let colors = if is_single { colors.index_axis_move(Axis(0), 0).into_dyn() } else { colors.into_dyn() };
         Ok(Values::from(colors).into_python(py))
     }

@@ -46,6 +46,25 @@ macro_rules! for_camera {
     }};
 }
 
+/// Value of `$act` with the handle of the sensor, whatever its type.
+macro_rules! for_sensor {
+    ($sim:expr, $uid:expr, |$id:ident| $act:expr) => {
+        for_sensor!(
+            $sim, $uid, |$id| $act, Camera, StereoCamera, RayCaster, RayCasterCamera, ContactSensor, Imu,
+            FrameTransformer, JointState, ActuatorState, JointWrench, MujocoSensor
+        )
+    };
+    ($sim:expr, $uid:expr, |$id:ident| $act:expr, $($Type:ty),*) => {
+        $(if let Some($id) = id_of::<$Type>($sim, $uid) {
+            $act
+        } else)* {
+            // The sensor failed, or has a type that this package does not have.
+            $sim.entities().sensor_by_uid($uid)?;
+            return Err(Failure::argument($uid, "this sensor has no markers"));
+        }
+    };
+}
+
 #[pymethods]
 impl Sensor {
     /// Name of the sensor.
@@ -318,29 +337,58 @@ impl Sensor {
 
     /// Shows or hides the markers of the sensor in views and in images with ``draw_markers``.
     fn set_debug_vis(&self, py: Python<'_>, shown: bool) -> PyResult<()> {
-        macro_rules! set {
-            ($sim:expr, $($Type:ty),*) => {
-                $(if let Some(id) = id_of::<$Type>($sim, &self.uid) {
-                    return Ok($sim.scene_mut().set_debug_vis(id, shown)?);
-                })*
-            };
-        }
         self.shared.write(py, |sim| {
-            set!(
-                sim,
-                Camera,
-                StereoCamera,
-                RayCaster,
-                RayCasterCamera,
-                ContactSensor,
-                Imu,
-                FrameTransformer,
-                JointState
-            );
-            set!(sim, ActuatorState, JointWrench, MujocoSensor);
-            sim.entities().sensor_by_uid(&self.uid)?;
+            for_sensor!(sim, &self.uid, |id| sim.scene_mut().set_debug_vis(id, shown)?);
             Ok(())
         })
+    }
+
+    /// True if the markers of the sensor are shown in views and in images with ``draw_markers``.
+    #[getter]
+    fn debug_vis(&self, py: Python<'_>) -> PyResult<bool> {
+        self.shared.read(py, |sim| Ok(for_sensor!(sim, &self.uid, |id| sim.scene().debug_vis(id)?)))
+    }
+
+    /// Time between measurements [s], after rounding to whole physics steps.
+    #[getter]
+    fn update_period(&self, py: Python<'_>) -> PyResult<f64> {
+        self.shared.read(py, |sim| {
+            let sensor = sim.entities().sensor_by_uid(&self.uid)?;
+            match camera_of(sensor) {
+                Some(camera) => Ok(camera.update_period()),
+                None => Ok(sampled(sensor, &self.uid)?.sampler().period()),
+            }
+        })
+    }
+
+    /// Physics steps until the sensor next measures, delivers a delayed measurement or opens its shutter in any environment, at
+    /// least 1; None for a sensor that failed.
+    #[getter]
+    fn due_in(&self, py: Python<'_>) -> PyResult<Option<u64>> {
+        let steps = self.shared.read(py, |sim| Ok(sim.entities().sensor_due_in(&self.uid)?))?;
+        Ok(if steps == u64::MAX { None } else { Some(steps) })
+    }
+
+    /// True if a camera is attached to a body.
+    #[getter]
+    fn is_attached(&self, py: Python<'_>) -> PyResult<bool> {
+        self.shared.read(py, |sim| {
+            let sensor = sim.entities().sensor_by_uid(&self.uid)?;
+            let any: &dyn Any = sensor;
+            let ray = any.downcast_ref::<RayCasterCamera>().map(RayCasterCamera::is_attached);
+            ray.or_else(|| camera_of(sensor).map(Camera::is_attached)).ok_or_else(|| not_a_camera(&self.uid))
+        })
+    }
+
+    /// Times of the current forces, efforts and accelerations of a numeric sensor [s], shape (num_envs,). They are of the
+    /// beginning of the last step, and ``stamps`` of its end.
+    #[getter]
+    fn force_stamps<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let stamps: Values<'_> = self.shared.read(py, |sim| {
+            let sensor = sim.entities().sensor_by_uid(&self.uid)?;
+            Ok(sampled(sensor, &self.uid)?.force_stamps().to_owned().into())
+        })?;
+        Ok(stamps.into_python(py))
     }
 
     fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
@@ -410,7 +458,7 @@ pub(crate) fn camera_of(sensor: &dyn kinetoscope::sensors::Sensor) -> Option<&Ca
     any.downcast_ref().or_else(|| any.downcast_ref::<StereoCamera>().map(StereoCamera::left))
 }
 
-fn sampled<'s>(
+pub(crate) fn sampled<'s>(
     sensor: &'s dyn kinetoscope::sensors::Sensor,
     uid: &str,
 ) -> Result<&'s dyn kinetoscope::sensors::Sampled, Failure> {

@@ -10,7 +10,9 @@ use pyo3::prelude::*;
 use std::hash::{DefaultHasher, Hash, Hasher as _};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::mpsc::{RecvTimeoutError, sync_channel};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, TryLockError};
+use std::time::Duration;
 
 /// Handle of an entity.
 #[derive(Clone, Debug)]
@@ -95,12 +97,17 @@ impl Shared {
         py: Python<'_>,
         act: impl FnOnce(&SimulationManager) -> Result<T, Failure> + Send,
     ) -> PyResult<T> {
-        py.detach(|| {
-            let guard = self.lock()?;
-            let sim = guard.as_ref().ok_or_else(destroyed)?.sim();
-            catch_unwind(AssertUnwindSafe(|| act(sim))).unwrap_or_else(|panic| Err(Failure::panic(&*panic)))
-        })
-        .map_err(Into::into)
+        py.detach(|| self.read_detached(act)).map_err(Into::into)
+    }
+
+    /// [`read`](Self::read) for a caller that does not hold the interpreter.
+    pub(crate) fn read_detached<T>(
+        &self,
+        act: impl FnOnce(&SimulationManager) -> Result<T, Failure>,
+    ) -> Result<T, Failure> {
+        let guard = self.lock()?;
+        let sim = guard.as_ref().ok_or_else(destroyed)?.sim();
+        guarded(|| act(sim))
     }
 
     /// Text of `repr`. Debuggers and notebooks ask for it at any time: it is no error that the simulation is gone, and a
@@ -114,7 +121,7 @@ impl Shared {
         let described = || {
             let state = match self.manager.try_lock() {
                 Ok(guard) => match guard.as_ref() {
-                    Some(simulated) => return act(simulated.sim()),
+                    Some(simulated) => return guarded(|| act(simulated.sim())),
                     None => "destroyed",
                 },
                 Err(TryLockError::WouldBlock) => "in use",
@@ -122,7 +129,7 @@ impl Shared {
             };
             Ok(format!("<{class} of a simulation that is {state}>"))
         };
-        detached(py, described)
+        py.detach(described).map_err(Into::into)
     }
 
     /// Changes the simulation without holding the interpreter. After a panic, later calls fail.
@@ -142,9 +149,10 @@ impl Shared {
         let locked = || {
             let mut guard = self.lock()?;
             // The guard is dropped while the panic unwinds, which poisons the lock.
+            panic_if_requested();
             act(guard.as_mut().ok_or_else(destroyed)?.sim_mut())
         };
-        catch_unwind(AssertUnwindSafe(locked)).unwrap_or_else(|panic| Err(Failure::panic(&*panic)))
+        caught(locked)
     }
 
     /// Starts a task in the environments, and returns its number. `make` gives the simulation back if the task is
@@ -155,6 +163,10 @@ impl Shared {
         make: impl FnOnce(SimulationManager) -> Result<Env, (Failure, Option<Box<SimulationManager>>)> + Send,
     ) -> PyResult<u64> {
         static STARTED: AtomicU64 = AtomicU64::new(0);
+        let made = |sim| {
+            panic_if_requested();
+            make(sim)
+        };
         let locked = || {
             let mut guard = self.lock()?;
             match guard.take() {
@@ -166,7 +178,7 @@ impl Shared {
                         "this simulation already has a task; end it with its method close",
                     ))
                 }
-                Some(Simulated::Alone(sim)) => match make(*sim) {
+                Some(Simulated::Alone(sim)) => match made(*sim) {
                     Ok(env) => {
                         let number = STARTED.fetch_add(1, Ordering::Relaxed);
                         *guard = Some(Simulated::Task(Box::new(env), number));
@@ -179,7 +191,7 @@ impl Shared {
                 },
             }
         };
-        detached(py, locked)
+        py.detach(|| caught(locked)).map_err(Into::into)
     }
 
     /// Uses the task with this number without holding the interpreter. After a panic, later calls fail.
@@ -189,10 +201,24 @@ impl Shared {
         number: u64,
         act: impl FnOnce(&mut Env) -> Result<T, Failure> + Send,
     ) -> PyResult<T> {
-        detached(py, || match self.lock()?.as_mut().ok_or_else(destroyed)? {
-            Simulated::Task(env, current) if *current == number => act(env),
+        py.detach(|| self.task_detached(number, act)).map_err(Into::into)
+    }
+
+    /// [`task`](Self::task) for a caller that does not hold the interpreter.
+    pub(crate) fn task_detached<T>(
+        &self,
+        number: u64,
+        act: impl FnOnce(&mut Env) -> Result<T, Failure>,
+    ) -> Result<T, Failure> {
+        let locked = || match self.lock()?.as_mut().ok_or_else(destroyed)? {
+            Simulated::Task(env, current) if *current == number => {
+                // The guard is dropped while the panic unwinds, which poisons the lock.
+                panic_if_requested();
+                act(env)
+            }
             Simulated::Task(..) | Simulated::Alone(_) => Err(Failure::new(Class::Destroyed, "the task was closed")),
-        })
+        };
+        caught(locked)
     }
 
     /// Ends the task with this number, if it has not ended; the simulation goes on alone.
@@ -331,7 +357,75 @@ pub(crate) fn detached<T: Send>(py: Python<'_>, act: impl FnOnce() -> Result<T, 
 
 /// Runs a call; a panic becomes an `InternalError`.
 pub(crate) fn guarded<T>(act: impl FnOnce() -> Result<T, Failure>) -> Result<T, Failure> {
+    caught(|| {
+        panic_if_requested();
+        act()
+    })
+}
+
+/// [`guarded`] for a call that panics itself if a test requests it.
+fn caught<T>(act: impl FnOnce() -> Result<T, Failure>) -> Result<T, Failure> {
     catch_unwind(AssertUnwindSafe(act)).unwrap_or_else(|panic| Err(Failure::panic(&*panic)))
+}
+
+/// Runs a call that may take long on another thread, and handles signals meanwhile. If a handler raises an exception, as that
+/// of Ctrl+C does, `stop` is set. The exception is raised when the call has returned. Python handles signals on its main thread
+/// only: a call of another thread runs on that thread.
+pub(crate) fn interruptible<T: Send>(
+    py: Python<'_>,
+    act: impl FnOnce(&AtomicBool) -> Result<T, Failure> + Send,
+) -> PyResult<T> {
+    let stop = &AtomicBool::new(false);
+    let threading = py.import("threading")?;
+    if !threading.call_method0("current_thread")?.is(&threading.call_method0("main_thread")?) {
+        return detached(py, || act(stop));
+    }
+    let (sender, receiver) = sync_channel(1);
+    let run = move || {
+        // The receiver outlives the thread.
+        let _ = sender.send(guarded(|| act(stop)));
+    };
+    let watch = move || {
+        std::thread::scope(|scope| {
+            let mut raised = None;
+            if let Err(error) = std::thread::Builder::new().spawn_scoped(scope, run) {
+                return (Err(Failure::new(Class::Other, format!("a thread cannot be started: {error}"))), raised);
+            }
+            loop {
+                match receiver.recv_timeout(SIGNAL_INTERVAL) {
+                    Ok(outcome) => return (outcome, raised),
+                    Err(RecvTimeoutError::Timeout) if raised.is_none() => {
+                        raised = Python::attach(|py| py.check_signals()).err();
+                        stop.store(raised.is_some(), Ordering::Relaxed);
+                    }
+                    Err(RecvTimeoutError::Timeout) => {}
+                    Err(RecvTimeoutError::Disconnected) => {
+                        return (Err(Failure::new(Class::Internal, "the thread of the call ended early")), raised);
+                    }
+                }
+            }
+        })
+    };
+    match py.detach(watch) {
+        (_, Some(raised)) => Err(raised),
+        (outcome, None) => Ok(outcome?),
+    }
+}
+
+/// Longest wait before signals are handled.
+pub(crate) const SIGNAL_INTERVAL: Duration = Duration::from_millis(50);
+
+/// True if the next guarded call panics.
+static PANICS: AtomicBool = AtomicBool::new(false);
+
+/// Makes the next guarded call panic, or ends such a request. Returns true if there was one. For tests.
+pub(crate) fn request_panic(requested: bool) -> bool {
+    PANICS.swap(requested, Ordering::Relaxed)
+}
+
+fn panic_if_requested() {
+    // A swap would write to memory that all threads share.
+    assert!(!(PANICS.load(Ordering::Relaxed) && request_panic(false)), "requested by a test");
 }
 
 fn destroyed() -> Failure {

@@ -2,17 +2,19 @@
 
 use crate::arguments::{array, envs};
 use crate::cfg;
+use crate::device::PythonPhysics;
 use crate::errors::{Class, Failure};
 use crate::objects::{MjcfPart, RigidObject, RigidObjectGroup, Terrain, Weld};
 use crate::robot::Robot;
 use crate::sensor::Sensor;
-use crate::shared::{Entity, Shared, detached, equal_handles, guarded};
+use crate::shared::{Entity, Shared, detached, equal_handles, guarded, interruptible};
 use crate::snapshot::Snapshot;
 use kinetoscope::ndarray::{Ix2, Ix3};
 use kinetoscope::prelude::{ArticulationCfg, MjcfPartCfg, RigidObjectCfg, RobotCfg, SceneCfg, TerrainCfg};
+use kinetoscope::robot::diagnostic::Diagnostic;
 use kinetoscope::sim::{
     EntityCfg, EntityTypes, EnvId, InteractiveScene, Property, Randomization, RigidObjectGroupCfg, SimulationManager,
-    WeldCfg,
+    WeldCfg, rollout_until,
 };
 use kinetoscope::viewer::ViewerExt as _;
 use numpy::{IntoPyArray, PyArray1};
@@ -190,7 +192,10 @@ impl Simulation {
         let mut block = 1;
         while left > 0 {
             let started = Instant::now();
-            let (now, mut wait) = self.shared.write(py, |sim| Ok(sim.update_without_waiting(block.min(left))))?;
+            let (now, mut wait) = self.shared.write(py, |sim| {
+                let done = sim.update_without_waiting(block.min(left));
+                sim.scene().device_failure().map_or(Ok(done), |error| Err(error.into()))
+            })?;
             left -= now;
             // Outside the lock, so that other threads and signal handlers can use the simulation meanwhile.
             while !wait.is_zero() {
@@ -209,6 +214,12 @@ impl Simulation {
         Ok(())
     }
 
+    /// Steps all environments by a time [s], a whole number of ``physics_dt``. Ctrl+C ends it as it ends ``update``.
+    fn update_for(&self, py: Python<'_>, seconds: f64) -> PyResult<()> {
+        let steps = self.shared.read(py, |sim| Ok(sim.cfg().steps_in(seconds)?))?;
+        self.update(py, steps)
+    }
+
     /// Resets environments to their initial state and time 0.
     #[pyo3(signature = (env_ids=None))]
     fn reset(&self, py: Python<'_>, env_ids: Option<&Bound<'_, PyAny>>) -> PyResult<()> {
@@ -224,6 +235,21 @@ impl Simulation {
         self.shared.write(py, |sim| Ok(sim.scene_mut().reset_buffers(env_ids.as_deref())?))
     }
 
+    /// An array of the physics on a device, without a copy: a ``warp.array`` with a row per environment, for
+    /// ``warp.to_torch`` and DLPack. Names: ``qpos``, ``qvel``, ``qacc_warmstart``, ``act`` and ``qacc``. Raises ``DeviceError``
+    /// on the device ``cpu``.
+    fn device_array(&self, py: Python<'_>, name: &str) -> PyResult<Py<PyAny>> {
+        let object = self.shared.read(py, |sim| {
+            let physics = sim
+                .scene()
+                .with_device(|physics| physics.as_any().downcast_ref::<PythonPhysics>().map(PythonPhysics::handle));
+            physics.flatten().ok_or_else(|| {
+                Failure::new(Class::Device, "the device cpu has no arrays of a GPU; use qpos and the like")
+            })
+        })?;
+        object.array(py, name)
+    }
+
     /// Number of environments.
     #[getter]
     fn num_envs(&self, py: Python<'_>) -> PyResult<usize> {
@@ -234,6 +260,14 @@ impl Simulation {
     #[getter]
     fn threads(&self, py: Python<'_>) -> PyResult<usize> {
         self.shared.read(py, |sim| Ok(sim.threads()))
+    }
+
+    /// Configuration of the simulation with all its values: a ``SimulationManagerCfg``. It is a copy: changes have no effect.
+    #[getter]
+    fn cfg<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let text = self.shared.read(py, |sim| Ok(toml::to_string(sim.cfg())?))?;
+        let table = py.import("tomllib")?.call_method1("loads", (text,))?;
+        py.import("kinetoscope._accepted")?.getattr("of_table")?.call1((cfg::SIMULATION, table))
     }
 
     /// Physics time step [s].
@@ -254,16 +288,30 @@ impl Simulation {
         Ok(self.shared.read(py, |sim| Ok(sim.cfg().env_origins()))?.into_pyarray(py).into_any())
     }
 
-    /// Everything repaired, ignored or unusual in the files and configurations of all entities.
+    /// Everything repaired, ignored or unusual in the files and configurations of all entities: texts with the attributes
+    /// ``kind``, ``message``, ``file`` and ``line``.
     #[getter]
-    fn diagnostics(&self, py: Python<'_>) -> PyResult<Vec<String>> {
-        self.shared.read(py, |sim| Ok(sim.diagnostics().iter().map(ToString::to_string).collect()))
+    fn diagnostics<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyAny>>> {
+        diagnostics(py, &self.shared.read(py, |sim| Ok(sim.diagnostics().to_vec()))?)
     }
 
     /// Counts of all warnings by name: diagnostics, and MuJoCo's warnings over all environments.
     #[getter]
     fn warnings(&self, py: Python<'_>) -> PyResult<BTreeMap<String, u64>> {
         self.shared.read(py, |sim| Ok(sim.warnings().counts()))
+    }
+
+    /// Counts of MuJoCo's warnings in one environment, by name.
+    fn env_warnings(&self, py: Python<'_>, env: usize) -> PyResult<BTreeMap<&'static str, u64>> {
+        self.shared.read(py, |sim| Ok(sim.warnings().env_counts(EnvId(env))?))
+    }
+
+    /// Positions and velocities of all joints in MuJoCo's layout, shapes (num_envs, nq) and (num_envs, nv). ``state_names`` names
+    /// the columns.
+    #[getter]
+    fn engine_states<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
+        let [qpos, qvel] = self.shared.read(py, |sim| Ok(sim.entities().engine_states()))?;
+        Ok((qpos.into_pyarray(py).into_any(), qvel.into_pyarray(py).into_any()))
     }
 
     /// Environments that are frozen after an invalid state, with the step and the reason.
@@ -364,7 +412,7 @@ impl Simulation {
 
     /// Simulates copies of environments: controls, shape (num_envs, steps, columns of ``control_names``). Returns the
     /// states after each step, shape (num_envs, steps, columns of ``state_names``), the final states as a snapshot, and
-    /// the diverged rows with their reasons. The simulation does not change.
+    /// the diverged rows with their reasons. The simulation does not change. Ctrl+C ends the call after the current step.
     #[pyo3(signature = (controls, start=None, env_ids=None))]
     #[expect(clippy::type_complexity, reason = "a tuple of Python")]
     fn rollout<'py>(
@@ -376,7 +424,9 @@ impl Simulation {
     ) -> PyResult<(Bound<'py, PyAny>, Snapshot, Vec<(usize, String)>)> {
         let (controls, env_ids) = (array::<Ix3>(controls, "rollout, controls")?, envs(&self.shared, env_ids)?);
         let start = start.map(|start| &start.get().inner);
-        let rollout = self.shared.read(py, |sim| Ok(sim.rollout(&controls, start, env_ids.as_deref())?))?;
+        let rollout = interruptible(py, |stop| {
+            self.shared.read_detached(|sim| Ok(rollout_until(sim, stop, &controls, start, env_ids.as_deref())?))
+        })?;
         let final_states = Snapshot { inner: rollout.final_states };
         Ok((rollout.states.into_pyarray(py).into_any(), final_states, rollout.diverged))
     }
@@ -422,6 +472,12 @@ impl Simulation {
         Ok(rows.into_pyarray(py).into_any())
     }
 
+    /// Value of a property of a link, object or joint in the model as it was compiled, which ``reset_properties`` returns to.
+    fn nominal_property(&self, py: Python<'_>, property: &str, name: &str) -> PyResult<Vec<f64>> {
+        let property = property_of(property)?;
+        self.shared.read(py, |sim| Ok(sim.properties().of(EnvId(0))?.nominal(property, name)?.to_vec()))
+    }
+
     /// Sets a property of a link, object or joint: one row for each of ``env_ids``, or one for all.
     #[pyo3(signature = (property, name, values, env_ids=None))]
     fn set_property(
@@ -451,8 +507,8 @@ impl Simulation {
 
     /// Writes the merged robots, the MJCF documents for both MuJoCo versions and the meshes to a folder. Returns
     /// diagnostics for everything left out.
-    fn dump(&self, py: Python<'_>, folder: PathBuf) -> PyResult<Vec<String>> {
-        self.shared.read(py, |sim| Ok(sim.dump(folder)?.iter().map(ToString::to_string).collect()))
+    fn dump<'py>(&self, py: Python<'py>, folder: PathBuf) -> PyResult<Vec<Bound<'py, PyAny>>> {
+        diagnostics(py, &self.shared.read(py, |sim| Ok(sim.dump(folder)?))?)
     }
 
     /// Names of the entities, in the order in which they were added.
@@ -595,6 +651,18 @@ fn add(sim: &mut SimulationManager, name: &str, cfg: EntityCfg) -> Result<Entity
         }
         _ => return Err(Failure::new(Class::Internal, "this package does not have the type of the entity")),
     })
+}
+
+/// Diagnostics as values of Python.
+fn diagnostics<'py>(py: Python<'py>, diagnostics: &[Diagnostic]) -> PyResult<Vec<Bound<'py, PyAny>>> {
+    let class = py.import("kinetoscope.diagnostics")?.getattr("Diagnostic")?;
+    let value = |diagnostic: &Diagnostic| {
+        let source = diagnostic.source.as_ref();
+        let file = source.map(|source| source.file.as_path());
+        let line = source.map(|source| source.line);
+        class.call1((diagnostic.to_string(), diagnostic.kind.name(), &diagnostic.message, file, line))
+    };
+    diagnostics.iter().map(value).collect()
 }
 
 /// Handle of an entity of a scene.

@@ -28,19 +28,19 @@ impl Snapshot {
 
     /// Environments of the snapshot.
     #[getter]
-    fn env_ids(&self) -> Vec<usize> {
-        self.inner.env_ids().into_iter().map(|env| env.0).collect()
+    fn env_ids(&self) -> PyResult<Vec<usize>> {
+        Ok(guarded(|| Ok(self.inner.env_ids().into_iter().map(|env| env.0).collect()))?)
     }
 
     /// Simulation times of the environments [s], shape (num_envs,).
     #[getter]
-    fn time<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        self.inner.time().into_pyarray(py)
+    fn time<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        Ok(guarded(|| Ok(self.inner.time()))?.into_pyarray(py))
     }
 
     /// Content of the file of the snapshot.
-    fn to_bytes<'py>(&self, py: Python<'py>) -> Bound<'py, PyBytes> {
-        PyBytes::new(py, &self.inner.to_bytes())
+    fn to_bytes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
+        Ok(PyBytes::new(py, &detached(py, || Ok(self.inner.to_bytes()))?))
     }
 
     /// Reads the content of a file of a snapshot.
@@ -50,7 +50,7 @@ impl Snapshot {
     }
 
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, (Bound<'py, PyBytes>,))> {
-        Ok((slf.get_type().getattr("from_bytes")?, (slf.get().to_bytes(slf.py()),)))
+        Ok((slf.get_type().getattr("from_bytes")?, (slf.get().to_bytes(slf.py())?,)))
     }
 
     fn __len__(&self) -> usize {

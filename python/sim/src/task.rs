@@ -3,7 +3,7 @@
 use crate::arguments::array;
 use crate::cfg;
 use crate::errors::{Class, Failure};
-use crate::shared::{Shared, equal_handles};
+use crate::shared::{Shared, equal_handles, interruptible};
 use crate::simulation::Simulation;
 use crate::values::Values;
 use kinetoscope::ndarray::{Array1, Ix1, Ix2};
@@ -15,6 +15,8 @@ use kinetoscope::tasks::{
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
 
 /// A task for learning agents in the environments of a simulation.
 ///
@@ -31,7 +33,12 @@ pub(crate) struct Task {
     number: u64,
     /// True for observations in single precision.
     is_single: bool,
+    /// True if steps take so long that a step must handle signals; at the first step, which is not known.
+    is_slow: AtomicBool,
 }
+
+/// Wall time of a step from which on it handles signals itself. It costs a thread, and physics steps in smaller blocks.
+const SLOW_STEP: Duration = Duration::from_millis(100);
 
 equal_handles! { Task: number }
 
@@ -89,7 +96,7 @@ impl Task {
         let cfg: TaskCfg = cfg::read("TaskCfg", Some(cfg))?;
         let shared = sim.get().shared.clone();
         let number = shared.start_task(py, |sim| build(sim, &cfg))?;
-        Ok(Self { shared, number, is_single })
+        Ok(Self { shared, number, is_single, is_slow: AtomicBool::new(true) })
     }
 
     /// The simulation, to serve, record or change it between steps.
@@ -241,14 +248,29 @@ impl Task {
 
     /// One step with actions, shape (num_envs, columns). Returns observations, rewards, terminated, truncated and a dict
     /// of ``final_observations``, ``reward_terms`` (num_envs, terms) and ``ended`` (episodes that ended: dicts). By
-    /// default, an environment whose episode ends begins the next one in the same step (``autoreset``).
+    /// default, an environment whose episode ends begins the next one in the same step (``autoreset``). Ctrl+C ends a long step,
+    /// after which all environments have to be reset.
     fn step<'py>(&self, py: Python<'py>, actions: &Bound<'_, PyAny>) -> PyResult<StepResult<'py>> {
         let actions = array::<Ix2>(actions, "step, actions")?;
-        let (step, present, last) = self.shared.task(py, self.number, |env| {
-            let step = env.step(&actions)?;
+        let started = Instant::now();
+        let results = |env: &mut Env, step| {
             let values = |is_final| observations(env.group(POLICY_GROUP)?, is_final, self.is_single);
             Ok((step, values(false)?, values(true)?))
-        })?;
+        };
+        let (step, present, last) = if self.is_slow.load(Ordering::Relaxed) {
+            interruptible(py, |stop| {
+                self.shared.task_detached(self.number, |env| {
+                    let step = env.step_until(stop, &actions)?;
+                    results(env, step)
+                })
+            })?
+        } else {
+            self.shared.task(py, self.number, |env| {
+                let step = env.step(&actions)?;
+                results(env, step)
+            })?
+        };
+        self.is_slow.store(started.elapsed() > SLOW_STEP, Ordering::Relaxed);
         let info = PyDict::new(py);
         info.set_item("final_observations", last.into_python(py))?;
         info.set_item("reward_terms", Values::from(step.info.reward_terms).into_python(py))?;

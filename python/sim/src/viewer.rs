@@ -1,20 +1,21 @@
 //! Windows, browser views and screenshots.
 
+use crate::arguments::{bytes, time_limit};
 use crate::cfg;
 use crate::errors::Failure;
-use crate::shared::Shared;
+use crate::shared::{SIGNAL_INTERVAL, Shared, detached, guarded};
 use crate::simulation::Simulation;
 use crate::values::Values;
-use kinetoscope::ndarray::Array3;
+use crate::viewer_control::check_speed;
+use kinetoscope::ndarray::{Array3, ArrayD};
 use kinetoscope::prelude::{OpenWindow as _, Screenshot as _, Serve as _};
-use kinetoscope::viewer::{EnvSelection, OrbitCamera, ScreenshotCfg, ServeCfg, ServerHandle, Speed, WindowCfg};
+use kinetoscope::viewer::{
+    Canvas, EnvSelection, ImageWindowCfg, OrbitCamera, ScreenshotCfg, ServeCfg, ServerHandle, Speed, WindowCfg,
+};
 use pyo3::prelude::*;
 use std::path::PathBuf;
 use std::sync::Arc;
-use std::time::{Duration, Instant};
-
-/// Longest wait before signals are handled.
-const SIGNAL_INTERVAL: Duration = Duration::from_millis(50);
+use std::time::Instant;
 
 /// A browser view of a simulation.
 #[pyclass(frozen, module = "kinetoscope")]
@@ -53,7 +54,26 @@ impl Server {
 #[pyclass(frozen, module = "kinetoscope")]
 #[derive(Debug)]
 pub(crate) struct Window {
-    inner: kinetoscope::viewer::Window,
+    pub(crate) inner: kinetoscope::viewer::Window,
+}
+
+/// Waits until a window is closed, at most `timeout` seconds, and returns true if it is.
+fn wait_until_closed(py: Python<'_>, window: &kinetoscope::viewer::Window, timeout: Option<f64>) -> PyResult<bool> {
+    let longest = time_limit(timeout, "timeout")?;
+    let started = Instant::now();
+    // In short waits, so that Ctrl+C ends the call.
+    while let Some(left) = longest.checked_sub(started.elapsed()) {
+        if detached(py, || Ok(window.wait(left.min(SIGNAL_INTERVAL))))?.is_some() {
+            return Ok(true);
+        }
+        py.check_signals()?;
+    }
+    Ok(!window.is_open())
+}
+
+/// Error that closed a window.
+fn failure(window: &kinetoscope::viewer::Window) -> Option<String> {
+    window.closed().and_then(|closed| closed.error().map(String::from))
 }
 
 #[pymethods]
@@ -74,26 +94,13 @@ impl Window {
     /// ``close`` or the end of the simulation closes it.
     #[pyo3(signature = (timeout=None))]
     fn wait(&self, py: Python<'_>, timeout: Option<f64>) -> PyResult<bool> {
-        let longest = match timeout {
-            None => Duration::MAX,
-            Some(seconds) => Duration::try_from_secs_f64(seconds.max(0.0))
-                .map_err(|_| Failure::argument("timeout", format!("{seconds} is not a time in seconds")))?,
-        };
-        let started = Instant::now();
-        // In short waits, so that Ctrl+C ends the call.
-        while let Some(left) = longest.checked_sub(started.elapsed()) {
-            if py.detach(|| self.inner.wait(left.min(SIGNAL_INTERVAL))).is_some() {
-                return Ok(true);
-            }
-            py.check_signals()?;
-        }
-        Ok(!self.inner.is_open())
+        wait_until_closed(py, &self.inner, timeout)
     }
 
     /// Error that closed the window, such as a lost display; None if it is open or was closed as intended.
     #[getter]
-    fn failure(&self) -> Option<String> {
-        self.inner.closed().and_then(|closed| closed.error().map(String::from))
+    fn failure(&self) -> PyResult<Option<String>> {
+        Ok(guarded(|| Ok(failure(&self.inner)))?)
     }
 
     /// Requests the window to close, without waiting.
@@ -104,6 +111,106 @@ impl Window {
     fn __repr__(&self) -> &'static str {
         if self.inner.is_open() { "<Window, open>" } else { "<Window, closed>" }
     }
+}
+
+/// A window for images that the program computes, such as the channels of a camera. It has a thread of its own, so it stays
+/// responsive while the program computes. It closes with ``close``, or when the object is dropped.
+#[pyclass(frozen, module = "kinetoscope")]
+#[derive(Debug)]
+pub(crate) struct ImageWindow {
+    inner: kinetoscope::viewer::ImageWindow,
+}
+
+#[pymethods]
+impl ImageWindow {
+    /// Opens an empty (black) window. ``size`` is its initial width and height [pixels], ``display`` an X display such as
+    /// ``":0"`` in place of the environment variable ``DISPLAY``. Raises ``ViewerError`` without a display.
+    #[new]
+    #[pyo3(signature = (title=None, size=None, *, display=None))]
+    fn new(py: Python<'_>, title: Option<String>, size: Option<[usize; 2]>, display: Option<String>) -> PyResult<Self> {
+        let defaults = ImageWindowCfg::default();
+        let (title, size) = (title.unwrap_or(defaults.title), size.unwrap_or(defaults.size));
+        check_size(size)?;
+        let cfg = ImageWindowCfg { title, size, display };
+        Ok(Self { inner: detached(py, || Ok(kinetoscope::viewer::ImageWindow::open(cfg)?))? })
+    }
+
+    /// Replaces the image and returns at once: uint8, shape (height, width, 4) or (height, width, 3). It is scaled to fit into the
+    /// window. Without effect after the window was closed.
+    fn show(&self, py: Python<'_>, image: &Bound<'_, PyAny>) -> PyResult<()> {
+        let pixels = bytes(image, "image")?;
+        detached(py, || {
+            self.inner.show(canvas(&pixels)?);
+            Ok(())
+        })
+    }
+
+    /// True while the window is open.
+    #[getter]
+    fn is_open(&self) -> bool {
+        self.inner.window().is_open()
+    }
+
+    /// Number of frames sent to the display.
+    #[getter]
+    fn frame_count(&self) -> u64 {
+        self.inner.window().frame_count()
+    }
+
+    /// Waits until the window is closed, at most ``timeout`` seconds, and returns True if it is.
+    #[pyo3(signature = (timeout=None))]
+    fn wait(&self, py: Python<'_>, timeout: Option<f64>) -> PyResult<bool> {
+        wait_until_closed(py, self.inner.window(), timeout)
+    }
+
+    /// Error that closed the window, such as a lost display; None if it is open or was closed as intended.
+    #[getter]
+    fn failure(&self) -> PyResult<Option<String>> {
+        Ok(guarded(|| Ok(failure(self.inner.window())))?)
+    }
+
+    /// Requests the window to close, without waiting.
+    fn close(&self) {
+        self.inner.window().close();
+    }
+
+    fn __enter__(slf: Bound<'_, Self>) -> Bound<'_, Self> {
+        slf
+    }
+
+    #[pyo3(signature = (*_exception))]
+    fn __exit__(&self, _exception: &Bound<'_, pyo3::types::PyTuple>) {
+        self.close();
+    }
+
+    fn __repr__(&self) -> &'static str {
+        if self.is_open() { "<ImageWindow, open>" } else { "<ImageWindow, closed>" }
+    }
+}
+
+/// Refuses a size of a window without pixels.
+fn check_size(size: [usize; 2]) -> PyResult<()> {
+    if size.contains(&0) {
+        return Err(Failure::argument("size", format!("{size:?} has no pixels")).into());
+    }
+    Ok(())
+}
+
+/// Image of an array of RGBA or RGB pixels.
+fn canvas(pixels: &ArrayD<u8>) -> Result<Canvas, Failure> {
+    let wrong = || {
+        let problem = format!("shape {:?}; expected (height, width, 4) or (height, width, 3)", pixels.shape());
+        Failure::argument("image", problem)
+    };
+    let &[height, width, components] = pixels.shape() else { return Err(wrong()) };
+    if !matches!(components, 3 | 4) || width == 0 || height == 0 {
+        return Err(wrong());
+    }
+    let mut rgba = vec![255; 4 * width * height];
+    for (to, from) in rgba.chunks_exact_mut(4).zip(pixels.rows()) {
+        to.iter_mut().zip(from).for_each(|(to, from)| *to = *from);
+    }
+    Canvas::from_rgba(width, height, &rgba).ok_or_else(wrong)
 }
 
 #[pymethods]
@@ -137,6 +244,14 @@ impl Simulation {
             allow_local_frames: allow_local_frames.unwrap_or(base.allow_local_frames),
             ..base
         };
+        check_speed(cfg.speed, "speed")?;
+        if !(cfg.max_fps > 0.0 && cfg.max_fps.is_finite()) {
+            let problem = format!("{} is not a number of images per second above 0", cfg.max_fps);
+            return Err(Failure::argument("max_fps", problem).into());
+        }
+        if !(1..=100).contains(&cfg.jpeg_quality) {
+            return Err(Failure::argument("jpeg_quality", format!("{} is not from 1 to 100", cfg.jpeg_quality)).into());
+        }
         let inner = self.shared.write_with_threads(py, |sim| Ok(sim.serve_with(address, cfg)?))?;
         Ok(Server { shared: Arc::clone(&self.shared), inner })
     }
@@ -171,6 +286,8 @@ impl Simulation {
                 ..WindowCfg::default()
             }
         };
+        check_speed(cfg.speed, "speed")?;
+        check_size(cfg.size)?;
         let inner = self.shared.write_with_threads(py, |sim| Ok(sim.open_window_with(cfg)?))?;
         Ok(Window { inner })
     }
@@ -223,6 +340,10 @@ impl Simulation {
     #[pyo3(signature = (width=960, height=540))]
     fn show(slf: &Bound<'_, Self>, width: u32, height: u32) -> PyResult<Py<PyAny>> {
         let py = slf.py();
+        if width == 0 || height == 0 {
+            let problem = format!("width {width} and height {height}; both must be at least 1 pixel");
+            return Err(Failure::argument("show", problem).into());
+        }
         let server = slf.get().serve(py, "127.0.0.1:0", None, None, None, None, Some(true), None)?;
         let frame = py.import("kinetoscope.notebook")?.getattr("Frame")?;
         frame.call1((server, width, height)).map(Bound::unbind)

@@ -1,7 +1,7 @@
 //! Control of a simulation as a viewer: pause, single steps, speed.
 
 use crate::errors::{Class, Failure};
-use crate::shared::Shared;
+use crate::shared::{Shared, detached};
 use crate::simulation::Simulation;
 use kinetoscope::sim::EnvId;
 use kinetoscope::viewer::{self, Command, SnapshotRequest, Speed, ViewerExt as _};
@@ -10,7 +10,8 @@ use pyo3::types::PyDict;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// A viewer that is a program, made by ``SimulationManager.viewer``: it pauses, steps and paces the simulation, while another
-/// thread steps it by ``update``, which handles commands after each step. Its pause and speed end with ``close``.
+/// thread steps it by ``update``, which handles commands after each step. Its pause and speed end with ``close``. While
+/// ``Playback.play`` shows a recording, the commands are for the recording.
 #[pyclass(frozen, module = "kinetoscope")]
 #[derive(Debug)]
 pub(crate) struct Viewer {
@@ -50,11 +51,9 @@ impl Viewer {
 
     /// Sets the speed: simulated seconds per second, from 0.001 to 1000, or None for no limit.
     fn set_speed(&self, py: Python<'_>, speed: Option<f64>) -> PyResult<()> {
-        let [least, most] = Speed::FACTOR_RANGE;
-        if let Some(speed) = speed.filter(|speed| !(least..=most).contains(speed)) {
-            return Err(Failure::argument("set_speed", format!("{speed} is not from {least} to {most}")).into());
-        }
-        self.send(py, Command::SetSpeed(speed.map_or(Speed::Unlimited, Speed::Factor)))
+        let speed = speed.map_or(Speed::Unlimited, Speed::Factor);
+        check_speed(Some(speed), "set_speed")?;
+        self.send(py, Command::SetSpeed(speed))
     }
 
     /// Resets an environment, or all, after the next step.
@@ -67,15 +66,25 @@ impl Viewer {
         self.send(py, Command::Reset(env.map(EnvId)))
     }
 
+    /// Shows the frame of a recording at a time [s], while ``Playback.play`` shows it; a time outside shows its first or last
+    /// frame.
+    fn seek(&self, py: Python<'_>, time: f64) -> PyResult<()> {
+        if !time.is_finite() {
+            return Err(Failure::argument("seek", format!("{time} is not a finite time in seconds")).into());
+        }
+        self.send(py, Command::Seek(time))
+    }
+
     /// State of the simulation when it last published one, at most 30 times per second: a dict of ``steps`` since the
     /// simulation was created, ``paused``, ``speed`` (None for no limit), ``measured_speed`` (simulated seconds per second, or
-    /// None) and ``refusal``, the reason of the last refused command, or None.
+    /// None), ``refusal``, the reason of the last refused command, or None, and ``timeline``, a dict of ``time``, ``start`` and
+    /// ``end`` [s] while ``Playback.play`` shows a recording, otherwise None. ``steps`` is then the index of the frame.
     #[getter]
     fn state<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let newest = match self.lock().as_ref() {
-            Some(viewer) => viewer.newest(),
-            None => return Err(closed().into()),
-        };
+        let newest = detached(py, || match self.lock().as_ref() {
+            Some(viewer) => Ok(viewer.newest()),
+            None => Err(closed()),
+        })?;
         let newest = newest.ok_or_else(|| Failure::new(Class::Viewer, "the simulation has published no state yet"))?;
         let dict = PyDict::new(py);
         dict.set_item("steps", newest.run.steps)?;
@@ -84,13 +93,24 @@ impl Viewer {
         dict.set_item("speed", speed)?;
         dict.set_item("measured_speed", newest.run.measured_speed)?;
         dict.set_item("refusal", &newest.run.last_refusal)?;
+        let timeline = newest.run.timeline.map(|timeline| {
+            let times = PyDict::new(py);
+            times.set_item("time", timeline.time)?;
+            times.set_item("start", timeline.start)?;
+            times.set_item("end", timeline.end)?;
+            Ok::<_, PyErr>(times)
+        });
+        dict.set_item("timeline", timeline.transpose()?)?;
         Ok(dict)
     }
 
     /// Ends the viewer, its pause and its speed. A second call does nothing.
-    fn close(&self, py: Python<'_>) {
-        let viewer = self.lock().take();
-        py.detach(|| drop(viewer));
+    fn close(&self, py: Python<'_>) -> PyResult<()> {
+        detached(py, || {
+            let viewer = self.lock().take();
+            drop(viewer);
+            Ok(())
+        })
     }
 
     fn __enter__(slf: Bound<'_, Self>) -> Bound<'_, Self> {
@@ -98,8 +118,8 @@ impl Viewer {
     }
 
     #[pyo3(signature = (*_exception))]
-    fn __exit__(&self, py: Python<'_>, _exception: &Bound<'_, pyo3::types::PyTuple>) {
-        self.close(py);
+    fn __exit__(&self, py: Python<'_>, _exception: &Bound<'_, pyo3::types::PyTuple>) -> PyResult<()> {
+        self.close(py)
     }
 
     fn __repr__(&self) -> &'static str {
@@ -109,7 +129,7 @@ impl Viewer {
 
 impl Viewer {
     fn send(&self, py: Python<'_>, command: Command) -> PyResult<()> {
-        let sent = py.detach(|| match self.lock().as_ref() {
+        let sent = detached(py, || match self.lock().as_ref() {
             Some(viewer) => Ok(viewer.send(command)),
             None => Err(closed()),
         })?;
@@ -123,6 +143,17 @@ impl Viewer {
     /// The viewer. The lock is never held during a step, or while waiting for Python's lock.
     fn lock(&self) -> MutexGuard<'_, Option<viewer::Viewer>> {
         self.inner.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// Refuses a speed that viewers would not set.
+pub(crate) fn check_speed(speed: Option<Speed>, name: &str) -> PyResult<()> {
+    let [least, most] = Speed::FACTOR_RANGE;
+    match speed {
+        Some(Speed::Factor(speed)) if !(least..=most).contains(&speed) => {
+            Err(Failure::argument(name, format!("{speed} is not from {least} to {most}")).into())
+        }
+        _ => Ok(()),
     }
 }
 

@@ -61,6 +61,19 @@ fn same_bits() {
     }
 }
 
+#[test]
+fn interrupted() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("run.npz");
+    recording(&path, |_, _| ());
+    let mut sim = arms();
+    let stopped = verify_until(&AtomicBool::new(true), &mut sim, &path);
+    let is_interrupted = |error: &RecordError| matches!(error, RecordError::Sim(error) if matches!(**error, kinetoscope_sim::Error::Interrupted));
+    assert!(stopped.as_ref().is_err_and(is_interrupted), "{stopped:?}");
+    // The simulation is usable, and verifies the whole recording.
+    assert!(verify_until(&AtomicBool::new(false), &mut sim, &path).unwrap().is_identical());
+}
+
 /// A recovered recording is verified as far as it goes.
 #[test]
 fn recovered_recording() {

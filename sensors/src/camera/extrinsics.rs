@@ -14,8 +14,8 @@ pub enum CameraConvention {
     /// ROS optical frame, also OpenCV's: x right, y down, z forward.
     #[default]
     Ros,
-    /// OpenGL and USD, also MuJoCo: x right, y up, z backward.
-    #[serde(alias = "opengl")]
+    /// OpenGL and USD, also MuJoCo: x right, y up, z backward. The name `open_gl` is the same.
+    #[serde(rename = "opengl", alias = "open_gl")]
     OpenGl,
     /// ROS body frame: x forward, y left, z up.
     World,

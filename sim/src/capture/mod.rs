@@ -14,7 +14,8 @@ use kinetoscope_scene::Contact;
 use kinetoscope_scene::StateFields;
 use std::sync::Arc;
 
-pub(crate) use motion::body_velocity;
+pub(crate) use contacts::SolvedContact;
+pub(crate) use motion::{SolvedBodies, body_velocity};
 
 /// Indices of the captured quantities in MuJoCo's arrays, the same for all environments.
 #[derive(Debug)]
@@ -112,14 +113,25 @@ impl CaptureRequest {
             (self.fields.contains(StateFields::ACCELERATIONS), self.fields.contains(StateFields::JOINT_WRENCHES));
         if accelerations || wrenches {
             data.rne_post_constraint(qvel, &mut solved.scratch)?;
-        }
-        if accelerations {
-            motion::capture(&self.body_axis.bodies, data, solved);
-        }
-        if wrenches {
-            motion::capture_wrenches(&self.body_axis, data, &mut solved.wrenches);
+            let gravity = data.model().gravity();
+            self.capture_motion(data, gravity, solved);
         }
         Ok(())
+    }
+
+    /// Captures solved contacts.
+    pub(crate) fn capture_contacts(&self, contacts: &[SolvedContact], solved: &mut CapturedStep) {
+        contacts::of_solved(&self.body_axis.geom_owners, contacts, &mut solved.contacts);
+    }
+
+    /// Captures accelerations and joint wrenches. `gravity` is that of the environment, in world axes \[m/s²\].
+    pub(crate) fn capture_motion(&self, data: &impl SolvedBodies, gravity: [f64; 3], solved: &mut CapturedStep) {
+        if self.fields.contains(StateFields::ACCELERATIONS) {
+            motion::capture(&self.body_axis.bodies, data, gravity, solved);
+        }
+        if self.fields.contains(StateFields::JOINT_WRENCHES) {
+            motion::capture_wrenches(&self.body_axis, data, &mut solved.wrenches);
+        }
     }
 }
 

@@ -12,6 +12,22 @@ use kinetoscope_mujoco::Data;
 use kinetoscope_scene::pose::to_row;
 use nalgebra::Vector3;
 
+/// MuJoCo's arrays of the motion and the solved forces of bodies.
+pub(crate) trait SolvedBodies: BodyArrays {
+    fn cacc(&self) -> &[f64];
+    fn cfrc_int(&self) -> &[f64];
+}
+
+impl SolvedBodies for Data {
+    fn cacc(&self) -> &[f64] {
+        self.cacc()
+    }
+
+    fn cfrc_int(&self) -> &[f64] {
+        self.cfrc_int()
+    }
+}
+
 fn vector_at(values: &[f64], first: usize) -> Vector3<f64> {
     Vector3::new(values[first], values[first + 1], values[first + 2])
 }
@@ -28,13 +44,14 @@ pub(crate) fn body_velocity(data: &impl BodyArrays, body: usize, point: &Vector3
     [vector_at(data.cvel(), 6 * body + 3) + angular.cross(&(point - reference_point(data, body))), angular]
 }
 
-/// Replaces the poses, velocities and accelerations in `solved` by those of all `bodies`.
-pub(super) fn capture(bodies: &[BodyFrame], data: &Data, solved: &mut CapturedStep) {
+/// Replaces the poses, velocities and accelerations in `solved` by those of all `bodies`. `gravity` is that of the
+/// environment, in world axes \[m/s²\].
+pub(super) fn capture(bodies: &[BodyFrame], data: &impl SolvedBodies, gravity: [f64; 3], solved: &mut CapturedStep) {
     let CapturedStep { poses, velocities, accelerations, .. } = solved;
     for values in [&mut *poses, &mut *velocities, &mut *accelerations] {
         values.clear();
     }
-    let gravity = Vector3::from(data.model().gravity());
+    let gravity = Vector3::from(gravity);
     for link in bodies {
         let (body, pose) = (link.body, link.pose(data));
         let point = pose.translation.vector;
@@ -51,7 +68,7 @@ pub(super) fn capture(bodies: &[BodyFrame], data: &Data, solved: &mut CapturedSt
 /// Replaces `wrenches` by the wrench that each body of the body axis receives from its parent through the joint: force
 /// \[N\], then torque \[N m\] about the origin of the body, in body axes, 6 numbers each. NaN for a body fused to
 /// another.
-pub(super) fn capture_wrenches(plan: &BodyAxis, data: &Data, wrenches: &mut Vec<f64>) {
+pub(super) fn capture_wrenches(plan: &BodyAxis, data: &impl SolvedBodies, wrenches: &mut Vec<f64>) {
     wrenches.clear();
     for (link, &carries) in plan.bodies.iter().zip(&plan.is_moving_body) {
         if !carries {

@@ -15,13 +15,18 @@ use nalgebra::{DMatrix, DVector};
 /// With `kp = 0`, the actuator's gain is `kd`, and `ctrl = v* + tau_ff / kd`. With `kp = kd = 0`, the gain is 1, and
 /// `ctrl = tau_ff`. `mjcf::robot` writes the gain.
 pub(super) fn apply(drive: &Drive, gains: &Gains, target: &Target, data: &mut mj::Data) {
-    data.ctrl_mut()[drive.ctrl] = if gains.kp > 0.0 {
+    data.ctrl_mut()[drive.ctrl] = control(gains, target);
+}
+
+/// Control that [`apply`] sets.
+pub(crate) fn control(gains: &Gains, target: &Target) -> f64 {
+    if gains.kp > 0.0 {
         target.position + (gains.kd * target.velocity + target.feedforward) / gains.kp
     } else if gains.kd > 0.0 {
         target.velocity + target.feedforward / gains.kd
     } else {
         target.feedforward
-    };
+    }
 }
 
 /// Integration of an actuator's damping in MuJoCo.

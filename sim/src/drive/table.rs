@@ -223,7 +223,7 @@ impl DriveState {
     }
 
     /// Position target, velocity target and feedforward effort of drive `drive` in this environment.
-    fn target(&self, drive: usize) -> Target {
+    pub(crate) fn target(&self, drive: usize) -> Target {
         let (position, velocity, feedforward) = (self.position[drive], self.velocity[drive], self.feedforward[drive]);
         Target { position, velocity, feedforward }
     }
@@ -303,6 +303,11 @@ impl DriveState {
     /// Sets the coefficients of the damping inside the drive solve.
     pub(crate) fn set_damping(&mut self, damping: &[f64]) {
         damping.iter().enumerate().for_each(|(index, value)| self.damping.set_if_changed(index, *value));
+    }
+
+    /// Coefficients of the damping inside the drive solve, in the order of [`DriveTable::damped`].
+    pub(crate) fn damping(&self) -> &[f64] {
+        &self.damping
     }
 
     /// True if these are the coefficients of the damping inside the drive solve, bit for bit.

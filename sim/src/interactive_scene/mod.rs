@@ -220,17 +220,8 @@ impl InteractiveScene {
     /// # Errors
     /// The time is negative, is not a whole number of steps, or is more than `u32::MAX` steps; then nothing is done.
     pub fn update_for(&mut self, seconds: f64) -> Result<()> {
-        let steps = seconds / self.sim.cfg().physics_dt;
-        let whole = steps.round();
-        // Tolerance for the quotient of two rounded numbers: 0.1 / 0.005 need not be 20.
-        if !((steps - whole).abs() <= 1e-6 && (0.0..=f64::from(u32::MAX)).contains(&whole)) {
-            return Err(Error::Config {
-                field: "seconds",
-                value: seconds.to_string(),
-                expected: "it must be a whole number of physics_dt, at most 4294967295 of them",
-            });
-        }
-        self.update(whole as u32);
+        let steps = self.sim.cfg().steps_in(seconds)?;
+        self.update(steps);
         Ok(())
     }
 }

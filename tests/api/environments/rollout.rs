@@ -3,7 +3,9 @@
 use super::worlds::{ALL, Ids, all_bits, cfg, world};
 use kinetoscope::ndarray::{Array2, Array3, Axis, concatenate, s};
 use kinetoscope::prelude::*;
-use kinetoscope::sim::Error;
+use kinetoscope::sim::{Error, rollout_until, update_until};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
 
 const STEPS: usize = 60;
 
@@ -159,6 +161,40 @@ fn diverged_row() {
     assert!(sim.diverged().is_empty());
     sim.restore(&rollout.final_states, ALL).unwrap();
     assert_eq!(sim.diverged().len(), 1);
+}
+
+/// A flag that is set ends rollouts and steps; one that is not changes no bit.
+#[test]
+fn interrupted() {
+    let (mut sim, _) = world(cfg(3, 2));
+    let (set, unset) = (AtomicBool::new(true), AtomicBool::new(false));
+    let (controls, before) = (controls(3), all_bits(&sim));
+    let stopped = rollout_until(&sim, &set, &controls, None, ALL);
+    assert!(matches!(stopped, Err(Error::Interrupted)), "{stopped:?}");
+    assert_eq!((update_until(&mut sim, &set, 50), all_bits(&sim)), (0, before));
+    // Set by another thread in the middle of steps that would take days.
+    let flag = &AtomicBool::new(false);
+    let (steps, late) = std::thread::scope(|scope| {
+        let setter = scope.spawn(move || {
+            std::thread::sleep(Duration::from_millis(200));
+            flag.store(true, Ordering::Relaxed);
+            Instant::now()
+        });
+        let steps = update_until(&mut sim, flag, u32::MAX);
+        let late = Instant::now().saturating_duration_since(setter.join().unwrap());
+        (steps, late)
+    });
+    assert!(steps > 0 && steps < u32::MAX && late < Duration::from_secs(2), "{steps} steps, {late:?}");
+    let (mut other, _) = world(cfg(3, 2));
+    other.update(steps);
+    assert_eq!(all_bits(&sim), all_bits(&other));
+    assert!(
+        rollout_until(&sim, &unset, &controls, None, ALL).unwrap().states
+            == other.rollout(&controls, None, ALL).unwrap().states
+    );
+    assert_eq!(update_until(&mut sim, &unset, 37), 37);
+    other.update(37);
+    assert_eq!(all_bits(&sim), all_bits(&other));
 }
 
 #[test]

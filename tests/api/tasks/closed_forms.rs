@@ -2,8 +2,10 @@
 
 use super::bundled::{cart_env, cart_task, cfg, world};
 use kinetoscope::ndarray::{Array2, array};
-use kinetoscope::tasks::{ActionTerm, EnvBuilder, EnvCfg, ObservationTerm, Space};
+use kinetoscope::sim::Error;
+use kinetoscope::tasks::{ActionTerm, EnvBuilder, EnvCfg, EnvError, ObservationTerm, Space};
 use kinetoscope_testkit::tolerance::{Tolerance, assert_close, assert_number};
+use std::sync::atomic::AtomicBool;
 
 const DT: f64 = 0.01;
 const FORCE: f64 = 4.0;
@@ -70,6 +72,23 @@ fn decimation() {
     let ((each, time), (once, _)) = (run(true), run(false));
     let expected = [5.0 * DT * FORCE, 10.0 * DT * FORCE, 0.1];
     assert_close("each step, the first alone, time", [each, once, time], expected, ROUNDING);
+}
+
+/// A step that a flag ends leaves no episode; with a flag that is not set, it is a step, in bits.
+#[test]
+fn interrupted_steps() {
+    let (set, unset) = (AtomicBool::new(true), AtomicBool::new(false));
+    let actions = array![[FORCE], [0.0], [-FORCE]];
+    let mut env = cart_env(3, None);
+    env.reset(None, None).unwrap();
+    let stopped = env.step_until(&set, &actions);
+    assert!(matches!(stopped, Err(EnvError::Sim(Error::Interrupted))), "{stopped:?}");
+    assert!(matches!(env.step(&actions), Err(EnvError::ResetFirst { env: 0 })));
+    let mut other = cart_env(3, None);
+    other.reset(None, None).unwrap();
+    env.reset(None, None).unwrap();
+    let (one, two) = (env.step_until(&unset, &actions).unwrap(), other.step(&actions).unwrap());
+    assert_eq!((one.observations, one.rewards), (two.observations, two.rewards));
 }
 
 #[test]

@@ -125,8 +125,8 @@ pub(super) const PHYSICS: &[Mutation] = &[
     Mutation {
         name: "contact force on the other body",
         file: "sim/src/capture/contacts.rs",
-        search: "force: force.into(),",
-        replacement: "force: (-force).into(),",
+        search: "force: (world_from_contact * Vector3::from(self.force)).into(),",
+        replacement: "force: (-(world_from_contact * Vector3::from(self.force))).into(),",
         tests: ("api", &["sensors::contact"]),
     },
     Mutation {

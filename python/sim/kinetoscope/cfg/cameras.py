@@ -40,12 +40,12 @@ class Placement:
         """
         return {"look_at": {"eye": eye, "target": target, "up": up}}
 
-CameraConvention: TypeAlias = Literal["ros", "open_gl", "world"]
+CameraConvention: TypeAlias = Literal["ros", "opengl", "world"]
 """Axis convention of a camera.
 
 ``"ros"``: ROS optical frame, also OpenCV's: x right, y down, z forward.
 
-``"open_gl"``: OpenGL and USD, also MuJoCo: x right, y up, z backward.
+``"opengl"``: OpenGL and USD, also MuJoCo: x right, y up, z backward. The name ``open_gl`` is the same.
 
 ``"world"``: ROS body frame: x forward, y left, z up.
 """

@@ -143,6 +143,9 @@ class SimulationManagerCfg:
     num_envs: int = 1
     """Number of environments."""
 
+    device: str | Mapping[str, Any] = "cpu"
+    """Device of the physics: ``cpu``, ``cuda``, ``cuda:N`` with the number of a GPU, or ``warp-cpu``."""
+
     physics_dt: float = 0.01
     """Physics time step [s]; MuJoCo's time step is ``physics_dt / substeps``."""
 

@@ -36,6 +36,13 @@ def array(values: Any) -> Any:
     return np.asarray(values)
 
 
+def random_integers(low: int, high: int, count: int) -> Any:
+    """Numbers from ``low`` to ``high``, both included, of the generator that scripts seed: torch's, or NumPy's without torch."""
+    if torch is None:
+        return np.random.randint(low, high + 1, count)
+    return torch.randint(low, high + 1, (count,)).numpy()
+
+
 def device() -> Any:
     """The device of all tensors: the CPU."""
     return numpy_torch.device() if torch is None else torch.device("cpu")

@@ -33,6 +33,15 @@ class IdealPDActuatorCfg(ActuatorBaseCfg):
 
 
 @configclass
+class DelayedPDActuatorCfg(IdealPDActuatorCfg):
+    """An explicit drive whose targets arrive late: by a whole number of physics steps, drawn from ``min_delay`` to
+    ``max_delay`` for each environment at each reset, the same for all joints of the actuator."""
+
+    min_delay: int = 0
+    max_delay: int = 0
+
+
+@configclass
 class DCMotorCfg(IdealPDActuatorCfg):
     """An explicit drive with the torque curve of a DC motor."""
 

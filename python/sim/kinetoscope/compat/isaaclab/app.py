@@ -44,8 +44,6 @@ class AppLauncher:
     def __init__(self, launcher_args: argparse.Namespace | dict[str, Any] | None = None, **kwargs: Any) -> None:
         given = dict(launcher_args) if isinstance(launcher_args, dict) else vars(launcher_args or argparse.Namespace())
         given = {**given, **kwargs}
-        if str(given.get("device", "cpu")).startswith("cuda"):
-            raise ValueError("--device cuda: this package simulates on the CPU; use cpu")
         AppLauncher.headless = bool(given.get("headless", False)) or int(given.get("livestream", -1)) > 0
         SimulationContext.wants_window = not AppLauncher.headless
         self.app = SimulationApp(AppLauncher.headless)
@@ -58,7 +56,7 @@ class AppLauncher:
         group.add_argument("--livestream", type=int, default=-1, choices=[-1, 0, 1, 2], help="ignored")
         group.add_argument("--offscreen_render", action="store_true", default=False, help="ignored: images need no flag")
         group.add_argument("--enable_cameras", action="store_true", default=False, help="ignored: images need no flag")
-        group.add_argument("--device", type=str, default="cpu", help="cpu")
+        group.add_argument("--device", type=str, default="cpu", help="device of the physics: cpu, cuda, cuda:N or warp-cpu")
         group.add_argument("--cpu", action="store_true", default=False, help="ignored")
         group.add_argument("--verbose", action="store_true", default=False, help="ignored")
         group.add_argument("--info", action="store_true", default=False, help="ignored")

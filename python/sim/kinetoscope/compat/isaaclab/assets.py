@@ -13,8 +13,9 @@ import numpy as np
 from ..._sim import Robot
 from ...errors import ConfigError
 from .._poses import to_world
-from .._tensors import array, tensor
+from .._tensors import array, random_integers, tensor
 from ..configclass import configclass
+from .actuators import DCMotorCfg, DelayedPDActuatorCfg, IdealPDActuatorCfg
 from .asset_base import AssetBaseCfg, RootAsset, RootData, ids_of
 from .names import resolve
 from .rigid_object import RigidObject, RigidObjectCfg
@@ -90,7 +91,6 @@ def drive_fields(cfg: ArticulationCfg) -> dict[str, Any]:
         "armature": "armature",
         "friction": "friction",
     }
-    models = {"IdealPDActuatorCfg": "ideal_pd", "DCMotorCfg": "dc_motor"}
     zero = dict.fromkeys(joints, 0.0)
     drive: dict[str, Any] = {"stiffness": dict(zero), "damping": dict(zero)}
     for group, actuator in cfg.actuators.items():
@@ -100,12 +100,23 @@ def drive_fields(cfg: ArticulationCfg) -> dict[str, Any]:
             values = getattr(actuator, field)
             if values is not None:
                 drive.setdefault(name, {}).update(joint_values(values, own, f"{owner}.{field}"))
-        model = models.get(type(actuator).__name__)
+        model = actuator_model(actuator, owner)
         if model is not None:
-            content = {"saturation_effort": float(actuator.saturation_effort)} if model == "dc_motor" else {}
-            drive.setdefault("actuators", {}).update({name: {model: content} for name in own})
+            drive.setdefault("actuators", {}).update(dict.fromkeys(own, model))
     # Keys of this package are patterns.
     return {field: {re.escape(name): value for name, value in values.items()} for field, values in drive.items()}
+
+
+def actuator_model(cfg: Any, owner: str) -> dict[str, Any] | None:
+    """Model of an explicit drive of this package; None for an implicit one."""
+    if isinstance(cfg, DelayedPDActuatorCfg):
+        low, high = int(cfg.min_delay), int(cfg.max_delay)
+        if not 0 <= low <= high:
+            raise ConfigError(f"{owner}: min_delay is {low} and max_delay is {high}; expected 0 <= min_delay <= max_delay")
+        return {"delayed_pd": {"delay": low, "max_delay": high}}
+    if isinstance(cfg, DCMotorCfg):
+        return {"dc_motor": {"saturation_effort": float(cfg.saturation_effort)}}
+    return {"ideal_pd": {}} if isinstance(cfg, IdealPDActuatorCfg) else None
 
 
 def articulation_fields(uid: str, cfg: ArticulationCfg) -> dict[str, Any]:
@@ -393,14 +404,26 @@ class Articulation(RootAsset):
         self._pending.clear()
 
     def reset(self, env_ids: Any = None) -> None:
-        """Removes the external forces and torques. ``InteractiveScene.reset`` clears all buffers."""
+        """Removes the external forces and torques, and draws the delays of delayed actuators. ``InteractiveScene.reset`` clears
+        all buffers."""
         chosen = ids_of(env_ids, self.num_instances)
+        self.draw_delays(chosen)
         none = np.zeros((self.num_instances if chosen is None else np.atleast_1d(chosen).size, self.num_bodies, 3))
         if len(none):
             self.native.set_external_wrench(none, none, "link", None, chosen)
 
+    def draw_delays(self, env_ids: Any = None) -> None:
+        """Draws a delay for each environment and delayed actuator, as torch or NumPy is seeded."""
+        rows = self.num_instances if env_ids is None else np.atleast_1d(env_ids).size
+        for actuator in self.cfg.actuators.values():
+            if isinstance(actuator, DelayedPDActuatorCfg) and rows:
+                ids, _ = self.find_joints(actuator.joint_names_expr)
+                steps = random_integers(int(actuator.min_delay), int(actuator.max_delay), rows)
+                self.native.set_delay(np.repeat(steps[:, None], len(ids), axis=1), ids, env_ids)
+
     def write_start(self) -> None:
-        """Writes the initial velocities, if there are any."""
+        """Writes the initial velocities, if there are any, and draws delays."""
+        self.draw_delays()
         start = self.cfg.init_state
         if np.asarray(self.data.default_joint_vel).any():
             self.native.write_qvel(np.asarray(self.data.default_joint_vel, dtype=float))

@@ -29,6 +29,26 @@ class GridPatternCfg:
 
 
 @configclass
+class LidarPatternCfg:
+    """Rays of a spinning lidar: channels at equal steps of elevation, azimuth fastest. Angles are in degrees."""
+
+    channels: int = 16
+    vertical_fov_range: Any = (-15.0, 15.0)
+    horizontal_fov_range: Any = (-180.0, 180.0)
+    horizontal_res: float = 1.0
+
+    def to_native(self) -> dict[str, Any]:
+        return {
+            "lidar": {
+                "channels": int(self.channels),
+                "vertical_fov_deg": [float(x) for x in self.vertical_fov_range],
+                "horizontal_fov_deg": [float(x) for x in self.horizontal_fov_range],
+                "horizontal_resolution_deg": float(self.horizontal_res),
+            }
+        }
+
+
+@configclass
 class BpearlPatternCfg:
     """Rays of a hemispherical lidar, angles in degrees."""
 

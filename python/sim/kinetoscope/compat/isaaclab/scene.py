@@ -29,6 +29,8 @@ from .sensors import (
     RayCaster,
     RayCasterCfg,
     SensorBaseCfg,
+    TiledCamera,
+    TiledCameraCfg,
 )
 from .sim import DistantLightCfg, DomeLightCfg, GroundPlaneCfg, SimulationContext
 
@@ -119,6 +121,7 @@ class InteractiveScene(Layer):
                 lights.append(native.LightCfg(color=tuple(strength * c for c in colors(light.color))))
         return native.SimulationManagerCfg.legged(
             num_envs=self.cfg.num_envs,
+            device=str(context.cfg.device),
             arena_space=float(self.cfg.env_spacing),
             physics_dt=float(context.cfg.dt),
             gravity=tuple(float(x) for x in context.cfg.gravity),
@@ -148,7 +151,6 @@ class InteractiveScene(Layer):
             aperture["vertical_offset"] = float(lens.vertical_aperture_offset)
             unsupported(name, f_stop=lens.f_stop != 0.0, history_length=cfg.history_length != 0)
             near, far = lens.clipping_range
-            convention = {"opengl": "open_gl"}.get(cfg.offset.convention, cfg.offset.convention)
             pose = {"pos": numbers(cfg.offset.pos), "rotation": numbers(cfg.offset.rot)}
             parent = "/".join(self._path(cfg.prim_path, name)[:-1]) if cfg.prim_path.count("/") > 1 else None
             fields = {
@@ -159,11 +161,12 @@ class InteractiveScene(Layer):
                 "far": float(far),
                 "update_period": float(cfg.update_period),
                 "intrinsics": {"aperture": aperture},
-                "extrinsics": {"parent": parent, "convention": convention, "placement": {"pose": pose}},
+                "extrinsics": {"parent": parent, "convention": cfg.offset.convention, "placement": {"pose": pose}},
                 "channels": list(cfg.data_types),
                 "debug_vis": cfg.debug_vis,
             }
-            return Camera(self.native.add_sensor(name, fields), self._origins, cfg)
+            kind = TiledCamera if isinstance(cfg, TiledCameraCfg) else Camera
+            return kind(self.native.add_sensor(name, fields), self._origins, cfg)
         if isinstance(cfg, RayCasterCfg):
             grounds = [path for path in cfg.mesh_prim_paths if path in self._grounds]
             if len(grounds) != len(cfg.mesh_prim_paths):
@@ -254,8 +257,11 @@ class InteractiveScene(Layer):
         return [*self.articulations, *self.rigid_objects, *self.sensors, *self.extras]
 
     def reset(self, env_ids: Any = None) -> None:
-        """Clears the buffers of entities and sensors. States do not change."""
-        self.native.reset_buffers(None if env_ids is None else array(env_ids))
+        """Clears the buffers of entities and sensors, and draws the delays of delayed actuators. States do not change."""
+        chosen = None if env_ids is None else array(env_ids)
+        self.native.reset_buffers(chosen)
+        for articulation in self.articulations.values():
+            articulation.draw_delays(chosen)
 
     def write_data_to_sim(self) -> None:
         """Writes the targets of all articulations."""

@@ -28,6 +28,8 @@ __all__ = [
     "RayCaster",
     "RayCasterCfg",
     "SensorBaseCfg",
+    "TiledCamera",
+    "TiledCameraCfg",
     "patterns",
 ]
 
@@ -62,6 +64,11 @@ class CameraCfg(SensorBaseCfg):
     data_types: Any = ("rgb",)
     width: int = 640
     height: int = 480
+
+
+@configclass
+class TiledCameraCfg(CameraCfg):
+    """A camera whose images of all environments are rendered together, as those of ``CameraCfg`` are here."""
 
 
 @configclass
@@ -253,6 +260,10 @@ def view_pose(eye: Any, target: Any) -> list[float]:
     matrix = np.eye(4)
     matrix[:3, :4] = np.stack([right, np.cross(backward, right), backward, eye], axis=1)
     return to_row(matrix)
+
+
+class TiledCamera(Camera):
+    """A camera whose images of all environments are rendered together, as those of ``Camera`` are here."""
 
 
 class RayCasterData(Layer):

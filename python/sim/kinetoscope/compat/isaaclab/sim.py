@@ -9,7 +9,9 @@ from ...errors import ViewerError
 from .._layer import Layer
 from ..configclass import configclass
 from .spawners import (
+    CapsuleCfg,
     CollisionPropertiesCfg,
+    ConeCfg,
     CuboidCfg,
     CylinderCfg,
     MassPropertiesCfg,
@@ -20,7 +22,9 @@ from .spawners import (
 )
 
 __all__ = [
+    "CapsuleCfg",
     "CollisionPropertiesCfg",
+    "ConeCfg",
     "CuboidCfg",
     "CylinderCfg",
     "DistantLightCfg",

@@ -105,17 +105,43 @@ class CylinderCfg(ShapeCfg):
     axis: str = "Z"
 
 
+@configclass
+class CapsuleCfg(ShapeCfg):
+    """A capsule along z [m]: ``height`` is that of the cylindrical part."""
+
+    radius: float = 1.0
+    height: float = 1.0
+    axis: str = "Z"
+
+
+@configclass
+class ConeCfg(ShapeCfg):
+    """A cone along z [m], with its base at -height / 2."""
+
+    radius: float = 1.0
+    height: float = 1.0
+    axis: str = "Z"
+
+
+# Shapes with an axis, and the shapes of this package.
+AXIAL = {
+    CylinderCfg: lambda cfg: native.ObjectShape.cylinder(radius=float(cfg.radius), length=float(cfg.height)),
+    CapsuleCfg: lambda cfg: native.ObjectShape.capsule(radius=float(cfg.radius), length=float(cfg.height)),
+    ConeCfg: lambda cfg: native.ObjectShape.cone(radius=float(cfg.radius), height=float(cfg.height)),
+}
+
+
 def shape(cfg: Any, owner: str) -> dict[str, Any]:
     """Fields of the shape and material of a rigid object of this package."""
     if isinstance(cfg, CuboidCfg):
         form = native.ObjectShape.box(size=[float(x) for x in np.asarray(array(cfg.size))])
     elif isinstance(cfg, SphereCfg):
         form = native.ObjectShape.sphere(radius=float(cfg.radius))
-    elif isinstance(cfg, CylinderCfg):
+    elif isinstance(cfg, tuple(AXIAL)):
         unsupported(f"{owner}.spawn", axis=cfg.axis.upper() != "Z")
-        form = native.ObjectShape.cylinder(radius=float(cfg.radius), length=float(cfg.height))
+        form = next(make(cfg) for kind, make in AXIAL.items() if isinstance(cfg, kind))
     else:
-        known = "CuboidCfg, SphereCfg or CylinderCfg"
+        known = "CuboidCfg, SphereCfg, CylinderCfg, CapsuleCfg or ConeCfg"
         raise ConfigError(f"{owner}: spawn is a {type(cfg).__name__}; a rigid object is a {known}")
     fields: dict[str, Any] = {"shape": form}
     body = cfg.rigid_props

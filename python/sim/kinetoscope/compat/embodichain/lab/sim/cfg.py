@@ -137,6 +137,18 @@ class RigidObjectCfg:
 
 
 @configclass
+class RigidObjectGroupCfg:
+    """Rigid objects under one uid, by name. ``body_type`` is that of all objects."""
+
+    uid: str | None = None
+    rigid_objects: Any = {}
+    body_type: Literal["dynamic", "kinematic"] = "dynamic"
+    folder_path: str | None = None
+    max_num: int = 1
+    ext: str = ".obj"
+
+
+@configclass
 class LightCfg:
     """A light: ``point``, or ``sun`` or ``direction`` from far away."""
 

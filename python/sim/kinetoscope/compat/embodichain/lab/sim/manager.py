@@ -24,10 +24,12 @@ from .cfg import (
     RenderCfg,
     RigidBodyAttributesCfg,
     RigidObjectCfg,
+    RigidObjectGroupCfg,
     RobotCfg,
     SimulationManagerCfg,
     URDFCfg,
 )
+from .object_group import RigidObjectGroup
 from .objects import Articulation, RigidObject, Robot
 from .sensors import (
     Camera,
@@ -68,8 +70,6 @@ class SimulationManager(Layer):
         unsupported(
             "SimulationManagerCfg", profiler=self.cfg.profiler is not None, visualization=self.cfg.visualization is not None
         )
-        if str(self.cfg.sim_device).startswith("cuda"):
-            raise ConfigError("sim_device is 'cuda': this package simulates on the CPU; use 'cpu'")
         self._steps = 0
         self._lights: list[native.LightCfg] = []
         self._assets: dict[str, Any] = {}
@@ -80,6 +80,7 @@ class SimulationManager(Layer):
         lights = {"lights": self._lights} if self._lights else {}
         return NativeSimulationManager(
             num_envs=self.cfg.num_envs,
+            device=str(self.cfg.sim_device),
             physics_dt=self.cfg.physics_dt,
             arena_space=self.cfg.arena_space,
             gravity=tuple(float(x) for x in array(self.cfg.physics_config.gravity)),
@@ -185,6 +186,18 @@ class SimulationManager(Layer):
             raise ConfigError("a rigid object needs a uid")
         return self._register(RigidObject(self, self.native.add_rigid_object(object_fields(cfg)), cfg))
 
+    def add_rigid_object_group(self, cfg: RigidObjectGroupCfg) -> RigidObjectGroup:
+        """Adds rigid objects as a group, whose arrays have one row per environment and object."""
+        if cfg.uid is None:
+            raise ConfigError("a group of rigid objects needs a uid")
+        unsupported("RigidObjectGroupCfg", folder_path=cfg.folder_path is not None)
+        objects = []
+        for name, one in cfg.rigid_objects.items():
+            fields = object_fields(one.replace(uid=name, body_type=cfg.body_type))
+            objects.append(fields)
+        group = self.native.add_rigid_object_group(uid=cfg.uid, objects=objects)
+        return self._register(RigidObjectGroup(self, group, cfg))
+
     def add_sensor(self, sensor_cfg: CameraCfg | ContactSensorCfg) -> Any:
         """Adds a camera, a pair of cameras, or a contact sensor. Bodies of a contact sensor must exist."""
         kinds = ((StereoCameraCfg, StereoCamera), (CameraCfg, Camera), (ContactSensorCfg, ContactSensor))
@@ -223,7 +236,7 @@ class SimulationManager(Layer):
     def get_robot(self, uid: str) -> Any:
         return self._assets.get(uid)
 
-    get_articulation = get_rigid_object = get_sensor = get_asset = get_robot
+    get_articulation = get_rigid_object = get_rigid_object_group = get_sensor = get_asset = get_robot
 
     def _uids(self, *kinds: type) -> list[str]:
         return [uid for uid, asset in self._assets.items() if type(asset) in kinds]
@@ -236,6 +249,9 @@ class SimulationManager(Layer):
 
     def get_rigid_object_uid_list(self) -> list[str]:
         return self._uids(RigidObject)
+
+    def get_rigid_object_group_uid_list(self) -> list[str]:
+        return self._uids(RigidObjectGroup)
 
     def get_sensor_uid_list(self) -> list[str]:
         return self._uids(Camera, StereoCamera, ContactSensor)
@@ -336,7 +352,6 @@ def object_fields(cfg: RigidObjectCfg) -> dict[str, Any]:
         "RigidObjectCfg",
         enable_collision=not attrs.enable_collision,
         static_friction=attrs.static_friction != attrs.dynamic_friction,
-        max_convex_hull_num=getattr(cfg.shape, "max_convex_hull_num", 1) != 1,
     )
     changed("RigidBodyAttributesCfg", attrs, RigidBodyAttributesCfg(), *WITHOUT_MEANING)
     fields: dict[str, Any] = {"uid": cfg.uid, "init_pose": pose(cfg), "body_type": cfg.body_type}
@@ -351,6 +366,9 @@ def object_fields(cfg: RigidObjectCfg) -> dict[str, Any]:
         moments = 0.4 * cfg.shape.radius**2
     elif isinstance(cfg.shape, MeshCfg):
         fields["shape"] = native.ObjectShape.mesh(path=cfg.shape.fpath)
+        pieces = int(cfg.shape.max_convex_hull_num)
+        if pieces > 1:
+            fields["mesh_collision"] = native.MeshCollision.pieces({"max_pieces": pieces})
     else:
         raise ConfigError(f"{cfg.uid}: shape is {cfg.shape!r}; use CubeCfg, SphereCfg or MeshCfg")
     if attrs.mass > 0:

@@ -101,7 +101,7 @@ def camera_cfg(cfg: CameraCfg) -> dict[str, Any]:
         "extrinsics": {
             "parent": extrinsics.parent,
             "placement": placement,
-            "convention": "ros" if extrinsics.parent is None else "open_gl",
+            "convention": "ros" if extrinsics.parent is None else "opengl",
         },
         "channels": channels(cfg),
         # EmbodiChain's consumers treat a depth of 0 as invalid.

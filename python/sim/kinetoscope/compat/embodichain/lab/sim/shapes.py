@@ -31,7 +31,7 @@ class SphereCfg(ShapeCfg):
 
 @configclass
 class MeshCfg(ShapeCfg):
-    """A mesh file, which collides as its convex hull."""
+    """A mesh file, which collides as its convex hull, or as at most ``max_convex_hull_num`` convex pieces if that is above 1."""
 
     fpath: str = ""
     max_convex_hull_num: int = 1
