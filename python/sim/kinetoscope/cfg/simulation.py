@@ -143,7 +143,7 @@ class SimulationManagerCfg:
     num_envs: int = 1
     """Number of environments."""
 
-    device: str | Mapping[str, Any] = "cpu"
+    device: str = "cpu"
     """Device of the physics: ``cpu``, ``cuda``, ``cuda:N`` with the number of a GPU, or ``warp-cpu``."""
 
     physics_dt: float = 0.01
