@@ -174,7 +174,19 @@ fn divergence() {
     assert_eq!(device.read_row(2, |row| (row.raw_qpos().to_vec(), row.steps())), (before, 0));
     assert_eq!(device.read_row(1, |row| row.steps()), 6);
     log.lock().expect("one thread").writes.clear();
-    device.run_in(&[2], |_, env| env.reset(|_, _| {}));
+    // Back in the very state that the device has: it must be sent, so that the device lets the environment run.
+    let there = device.with_device(|physics| {
+        let reference = physics.as_any().downcast_ref::<Reference>().expect("this device");
+        reference.batch.read_at(2, Stage::Raw, |env| env.state_arrays())
+    });
+    let there = there.expect("on a device");
+    device.run_in(&[2], |_, env| {
+        env.reset(|data, _| {
+            data.qpos_mut().copy_from_slice(&there.qpos);
+            data.qvel_mut().copy_from_slice(&there.qvel);
+            data.qacc_warmstart_mut().copy_from_slice(&there.warmstart);
+        });
+    });
     device.step(1);
     let writes = std::mem::take(&mut log.lock().expect("one thread").writes);
     let states = ["qacc_warmstart", "qpos", "qvel"].map(|name| (name.to_string(), vec![2]));
