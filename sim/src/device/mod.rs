@@ -89,7 +89,7 @@ impl TryFrom<String> for Device {
 #[non_exhaustive]
 pub enum DeviceError {
     /// The device or its software is not available; the message names the repair.
-    #[error("--device {device}: {message}")]
+    #[error("device {device}: {message}")]
     Unavailable {
         /// The device.
         device: Device,
@@ -101,7 +101,7 @@ pub enum DeviceError {
     Unsupported {
         /// Element of the scene.
         what: String,
-        /// What works.
+        /// Supported alternative.
         expected: String,
     },
     /// The physics on the device failed.

@@ -20,7 +20,7 @@ const SCENE: &str = r#"<mujoco><option timestep="0.002"/><worldbody><geom type="
     <body pos="1 0 0.15"><freejoint/><geom type="box" size="0.1 0.1 0.1" mass="1"/></body></worldbody>
     <actuator><general joint="" gainprm="0"/></actuator></mujoco>"#;
 
-/// What a [`Reference`] was asked.
+/// Record of the calls of a [`Reference`].
 #[derive(Debug, Default)]
 struct Log {
     writes: Vec<(String, Vec<i32>)>,
@@ -106,7 +106,7 @@ fn batch() -> Batch {
     Batch::new(&model, &table, NUM_ENVS, 2, ThreadPool::new()).expect("small")
 }
 
-/// A batch on a [`Reference`], and what that was asked.
+/// A batch on a [`Reference`], and the record of its calls.
 fn on_device(diverges: Vec<usize>) -> (Batch, Arc<Mutex<Log>>) {
     let log = Arc::new(Mutex::new(Log::default()));
     let mut batch = batch();

@@ -178,7 +178,7 @@ mod tests {
             ("false", "the worker process ended (exit status: 1); it needs the Python package kinetoscope"),
         ] {
             let error = Worker::start_with(Device::WarpCpu, &python.into()).expect_err("no worker").to_string();
-            assert!(error.starts_with(&format!("--device warp-cpu: {message}")), "{error}");
+            assert!(error.starts_with(&format!("device warp-cpu: {message}")), "{error}");
         }
     }
 }
