@@ -8,7 +8,7 @@ mod shadows;
 use super::*;
 use crate::geometry::assets::RayAssetCache;
 use crate::raster::Layer;
-use crate::simd::Scalar;
+use crate::simd::{SimdLevel, at_level};
 use crate::visibility::View;
 use kinetoscope_scene::shape::Shape;
 use kinetoscope_scene::shape::{Box, Capsule, Cylinder, Ellipsoid, Plane, Sphere};
@@ -80,14 +80,18 @@ impl<'a> TestScene<'a> {
     /// The light of a pixel in several images with different seeds: the mean and its standard deviation.
     fn mean_light(&self, paths: &PathTracer<'_>, count: u32) -> (f64, f64) {
         let mut stack = TraversalStack::default();
-        let all: Vec<f64> = (0..count)
-            .map(|seed| PathTracer { seed, ..paths.clone() }.pixel(Scalar, [0, 0], &mut stack).color[1])
-            .collect();
+        let all: Vec<f64> =
+            (0..count).map(|seed| pixel(&PathTracer { seed, ..paths.clone() }, [0, 0], &mut stack)).collect();
         let n = f64::from(count);
         let mean = all.iter().sum::<f64>() / n;
         let variance = all.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / (n - 1.0);
         (mean, (variance / n).sqrt())
     }
+}
+
+/// The light of a pixel.
+fn pixel(paths: &PathTracer<'_>, at: [usize; 2], stack: &mut TraversalStack) -> f64 {
+    at_level!(SimdLevel::best(), s => paths.pixel(s, at, stack)).color[1]
 }
 
 /// The light of a pixel in sixteen images: the mean and its standard deviation.

@@ -160,6 +160,31 @@ macro_rules! operations {
                 $body
             })*
         }
+
+        /// Calls all operations with many vectors.
+        #[cfg(test)]
+        pub(super) fn all_results<S: Simd>(s: S) -> Vec<super::tests::Call> {
+            use super::tests::{Call, choices, kind::{self, Kind}};
+            let mut calls = Vec::new();
+            // A function for each operation: compilers need minutes for one function with all.
+            $({
+                #[inline(never)]
+                fn $name<S: Simd>(s: S, choice: [usize; 3]) -> Call {
+                    let mut choice = choice.into_iter();
+                    $(
+                        let $arg = choice.next().unwrap_or_default();
+                    )*
+                    let arguments = vec![$(<kind::$A as Kind<S>>::bits(<kind::$A as Kind<S>>::vector(s, $arg))),*];
+                    $(
+                        let $arg = <kind::$A as Kind<S>>::vector(s, $arg);
+                    )*
+                    let result = s.vectorize(#[inline(always)] || S::$name($($arg),*));
+                    Call { operation: stringify!($name), arguments, result: <kind::$R as Kind<S>>::bits(result) }
+                }
+                calls.extend(choices().map(|choice| $name(s, choice)));
+            })*
+            calls
+        }
     };
 }
 

@@ -33,7 +33,7 @@ fn image(scene: &RenderScene, poses: &[PoseF32], aperture: Option<&Aperture>, sa
     let mut paths = studio.paths(samples, 0, 1);
     paths.camera_rays.thin_lens = aperture.and_then(ThinLens::from_aperture);
     let mut stack = TraversalStack::default();
-    (0..SIZE * SIZE).map(|k| paths.pixel(Scalar, [k % SIZE, k / SIZE], &mut stack).color[1]).collect()
+    (0..SIZE * SIZE).map(|k| pixel(&paths, [k % SIZE, k / SIZE], &mut stack)).collect()
 }
 
 /// Sum, means and variances along both axes.

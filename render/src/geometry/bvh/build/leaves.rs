@@ -95,7 +95,7 @@ pub(super) fn leaf_ends<S: Simd>(
 mod tests {
     use super::super::Bounds;
     use super::*;
-    use crate::simd::{Scalar, all_levels, at_level};
+    use crate::simd::{SimdLevel, all_levels, at_level};
 
     /// Cost of leaves, by their areas.
     fn cost(things: &[BuildItem], ends: impl IntoIterator<Item = usize>) -> f32 {
@@ -129,7 +129,7 @@ mod tests {
                     BuildItem::item(lo, lo.map(|x| x + long), k, 1)
                 })
                 .collect();
-            let (ends, leaves) = leaf_ends(Scalar, &things, &mut kept);
+            let (ends, leaves) = at_level!(SimdLevel::best(), s => leaf_ends(s, &things, &mut kept));
             let chosen = ends[..leaves].iter().map(|&end| usize::from(end));
             assert!(
                 chosen.clone().scan(0, |last, end| Some(end - std::mem::replace(last, end))).all(|n| n <= MAX_LEAF)
