@@ -374,8 +374,7 @@ impl FixedTargets {
 }
 
 /// Casts all packets against one target; keeps hits that are nearer than those in `hits`, or as near and of an earlier
-/// instance. Compiled once for each instruction set.
-#[inline(never)]
+/// instance.
 fn cast_target<S: Simd>(
     s: S,
     targets: &RayTargets,
@@ -385,10 +384,7 @@ fn cast_target<S: Simd>(
     stack: &mut TraversalStack,
 ) {
     let target = &targets.targets[placed.target as usize];
-    s.vectorize(
-        #[inline(always)]
-        || target.geometry.with(CastTarget { s, target, placed, packets, hits, stack }),
-    );
+    target.geometry.with(CastTarget { s, target, placed, packets, hits, stack });
 }
 
 /// Bounding box of several rays.
@@ -435,21 +431,27 @@ struct CastTarget<'a, S> {
 }
 
 impl<S: Simd> ShapeVisitor for CastTarget<'_, S> {
-    #[inline(always)]
+    /// Compiled once for each shape and instruction set.
+    #[inline(never)]
     fn run<T: RayShape>(self, shape: &T) {
         let Self { s, target, placed, packets, hits, stack } = self;
         let pose = &placed.world_from_target;
-        for (packet, hits) in packets.iter_mut().zip(hits.chunks_mut(WIDTH)) {
-            let Some(local) = packet.in_local_frame(s, pose, placed.center, placed.radius) else { continue };
-            let mut touches = [None; WIDTH];
-            shape.intersect_packet(s, &local, stack, &mut touches);
-            for (k, hit) in hits.iter_mut().enumerate() {
-                if let Some(touch) = touches[k] {
-                    keep_closest(hit, packet.ray(k).direction, target, placed, touch);
-                    packet.limit_to(k, hit.distance);
+        s.vectorize(
+            #[inline(always)]
+            || {
+                for (packet, hits) in packets.iter_mut().zip(hits.chunks_mut(WIDTH)) {
+                    let Some(local) = packet.in_local_frame(s, pose, placed.center, placed.radius) else { continue };
+                    let mut touches = [None; WIDTH];
+                    shape.intersect_packet(s, &local, stack, &mut touches);
+                    for (k, hit) in hits.iter_mut().enumerate() {
+                        if let Some(touch) = touches[k] {
+                            keep_closest(hit, packet.ray(k).direction, target, placed, touch);
+                            packet.limit_to(k, hit.distance);
+                        }
+                    }
                 }
-            }
-        }
+            },
+        );
     }
 }
 

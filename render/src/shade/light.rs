@@ -332,8 +332,10 @@ fn skybox<S: Simd>(s: S, image: &Texture, lighting: &Lighting, direction: V3<S>,
 
 /// Color of a surface, in the [`BlendSpace`] of the frame. `tint` multiplies the color of the surface, but not its
 /// highlights. With `corner_light`, light was computed at the corners of polygons.
-#[inline(always)]
-#[expect(clippy::too_many_arguments, reason = "inlined into its callers")]
+///
+/// Compiled once for each instruction set, not in each of its callers.
+#[inline(never)]
+#[expect(clippy::too_many_arguments, reason = "as many as the quantities of a shaded surface")]
 pub(crate) fn shade<S: Simd>(
     s: S,
     context: &ShadeContext<'_>,
@@ -344,185 +346,195 @@ pub(crate) fn shade<S: Simd>(
     tint: f32,
     lanes: M<S>,
 ) -> V3<S> {
-    let ShadeContext { scene, lighting, shadows, shadow_rays, pixel, eye, receives_shadows, image_axes } = *context;
-    let ViewRays { direction: view, distance } = rays;
-    let material = &source.instance.material;
-    let display = scene.lighting_space == LightingSpace::Display;
-    // In OpenGL, transparent surfaces are drawn at last, in the light of all lights.
-    let receives_shadows = receives_shadows && (scene.opengl.is_none() || material.rgba[3] >= 1.0);
-    let base = if display {
-        let [r, g, b, _] = material.rgba;
-        V3::splat(s, [r, g, b])
-    } else {
-        albedo(s, source, at, view, pixel, lanes)
-    };
-    let base = if tint == 1.0 { base } else { base.scale(splat(s, tint)) };
-    let zero = splat(s, 0.0);
-    let n = at.shading_normal;
-    let is_back = scene.opengl.is_some() && source.instance.group == OpenGlRules::BACK_GROUP;
-    let n = if is_back { n.scale(splat(s, -1.0)) } else { n };
-    // Ambient light: interpolated between ground and sky by the normal's height.
-    let up = n.z * 0.5 + 0.5;
-    let (sky_light, ground) = (scene.ambient.sky, scene.ambient.ground);
-    let ambient = {
+    s.vectorize(
         #[inline(always)]
-        |k: usize| up * (sky_light[k] - ground[k]) + (ground[k] + material.emission)
-    };
-    let mut diffuse = [ambient(0), ambient(1), ambient(2)];
-    if let Some(rays) = shadow_rays.filter(|rays| rays.occlusion_rays > 0) {
-        let [above, below] = rays.occlusion(s, at.point(), n, lanes);
-        // The occluded fractions are estimates: they are limited to the light that is there.
-        let (above, below) = (min(above, up), min(below, splat(s, 1.0) - up));
-        for (k, diffuse) in diffuse.iter_mut().enumerate() {
-            *diffuse = *diffuse - above * sky_light[k] - below * ground[k];
-        }
-    }
-    let mut gloss = [zero, zero, zero];
-    let shiny = Highlight::from_material(material, display);
-    let headlight = &scene.headlight;
-    if headlight.active && !lighting.headlight_is_light {
-        let facing = max(-n.dot(view), zero);
-        for (k, diffuse) in diffuse.iter_mut().enumerate() {
-            *diffuse += facing * headlight.diffuse[k] + headlight.ambient[k];
-        }
-        let seen = lanes & facing.simd_gt(splat(s, shiny.faint));
-        if shiny.is_visible(headlight.specular) && seen.any_true() {
-            let shine = select(seen, power(s, facing, shiny.exponent) * shiny.strength, zero);
-            for (gloss, specular) in gloss.iter_mut().zip(headlight.specular) {
-                *gloss += shine * specular;
-            }
-        }
-    }
-    // The sum of all further passes, each clamped.
-    let mut passes = V3::splat(s, [0.0; 3]);
-    for prepared in lighting.lights.iter().filter(|_| corner_light.is_none()) {
-        let light = &prepared.light;
-        let Some((to, strength)) = prepared.illumination(s, at.position, lanes) else { continue };
-        let facing = max(n.dot(to), zero);
-        let mut lit = strength;
-        let mut ambient_light = strength;
-        // The ambient light of a light with shadows matters on its dark side, too.
-        let matters = {
-            #[inline(always)]
-            || {
-                let has_ambient = scene.opengl.is_some() && light.ambient != [0.0; 3];
-                lanes & if has_ambient { strength } else { facing * strength }.simd_gt(splat(s, 1e-4))
-            }
-        };
-        if let Some(map) = prepared.shadow.filter(|_| receives_shadows).and_then(|k| shadows.get(k)) {
-            let matters = matters();
-            if matters.any_true() {
-                let seen = map.visibility(s, at.position, at.normal, source.placed.error, matters);
-                let seen = if scene.opengl.is_some() { whole(s, seen) } else { seen };
-                (lit, ambient_light) = (lit * seen, ambient_light * seen);
-            }
-        }
-        if let Some(rays) = shadow_rays.filter(|rays| rays.shadows && light.cast_shadow && receives_shadows) {
-            let matters = matters();
-            if matters.any_true() {
-                let seen = rays.visibility(s, light, prepared.along.map(|x| -x), at.point(), matters);
-                (lit, ambient_light) = (lit * seen, ambient_light * seen);
-            }
-        }
-        let own_pass = prepared.own_pass && receives_shadows;
-        let mut pass_gloss = [zero, zero, zero];
-        let gloss = if own_pass { &mut pass_gloss } else { &mut gloss };
-        if !own_pass {
-            for (k, diffuse) in diffuse.iter_mut().enumerate() {
-                *diffuse += facing * lit * light.diffuse[k] + strength * light.ambient[k];
-            }
-        }
-        if shiny.is_visible(light.specular) {
-            // The cosine between the normal and the half vector, compared before its root is taken.
-            let half = to.sub(match eye {
-                None => view,
-                Some(eye) => at.position.sub(V3::splat(s, eye)).unit(s),
-            });
-            let (along, square) = (n.dot(half), half.dot(half));
-            let bright = (along * along).simd_gt(square * (shiny.faint * shiny.faint));
-            let seen = lanes & bright & along.simd_gt(zero) & facing.simd_gt(zero);
-            if seen.any_true() {
-                let cosine = along / select(seen, square, splat(s, 1.0)).sqrt();
-                let shine = select(seen, power(s, cosine, shiny.exponent) * shiny.strength, zero);
-                for (gloss, specular) in gloss.iter_mut().zip(light.specular) {
-                    *gloss += shine * lit * specular;
+        || {
+            let ShadeContext { scene, lighting, shadows, shadow_rays, pixel, eye, receives_shadows, image_axes } =
+                *context;
+            let ViewRays { direction: view, distance } = rays;
+            let material = &source.instance.material;
+            let display = scene.lighting_space == LightingSpace::Display;
+            // In OpenGL, transparent surfaces are drawn at last, in the light of all lights.
+            let receives_shadows = receives_shadows && (scene.opengl.is_none() || material.rgba[3] >= 1.0);
+            let base = if display {
+                let [r, g, b, _] = material.rgba;
+                V3::splat(s, [r, g, b])
+            } else {
+                albedo(s, source, at, view, pixel, lanes)
+            };
+            let base = if tint == 1.0 { base } else { base.scale(splat(s, tint)) };
+            let zero = splat(s, 0.0);
+            let n = at.shading_normal;
+            let is_back = scene.opengl.is_some() && source.instance.group == OpenGlRules::BACK_GROUP;
+            let n = if is_back { n.scale(splat(s, -1.0)) } else { n };
+            // Ambient light: interpolated between ground and sky by the normal's height.
+            let up = n.z * 0.5 + 0.5;
+            let (sky_light, ground) = (scene.ambient.sky, scene.ambient.ground);
+            let ambient = {
+                #[inline(always)]
+                |k: usize| up * (sky_light[k] - ground[k]) + (ground[k] + material.emission)
+            };
+            let mut diffuse = [ambient(0), ambient(1), ambient(2)];
+            if let Some(rays) = shadow_rays.filter(|rays| rays.occlusion_rays > 0) {
+                let [above, below] = rays.occlusion(s, at.point(), n, lanes);
+                // The occluded fractions are estimates: they are limited to the light that is there.
+                let (above, below) = (min(above, up), min(below, splat(s, 1.0) - up));
+                for (k, diffuse) in diffuse.iter_mut().enumerate() {
+                    *diffuse = *diffuse - above * sky_light[k] - below * ground[k];
                 }
             }
-        }
-        if own_pass {
-            let (bright, one) = (facing * lit, splat(s, 1.0));
-            if scene.opengl.is_some() {
-                let [r, g, b] = [0, 1, 2].map(|k| bright * light.diffuse[k] + ambient_light * light.ambient[k]);
-                passes.x += min(base.x * r + pass_gloss[0], one);
-                passes.y += min(base.y * g + pass_gloss[1], one);
-                passes.z += min(base.z * b + pass_gloss[2], one);
-                continue;
+            let mut gloss = [zero, zero, zero];
+            let shiny = Highlight::from_material(material, display);
+            let headlight = &scene.headlight;
+            if headlight.active && !lighting.headlight_is_light {
+                let facing = max(-n.dot(view), zero);
+                for (k, diffuse) in diffuse.iter_mut().enumerate() {
+                    *diffuse += facing * headlight.diffuse[k] + headlight.ambient[k];
+                }
+                let seen = lanes & facing.simd_gt(splat(s, shiny.faint));
+                if shiny.is_visible(headlight.specular) && seen.any_true() {
+                    let shine = select(seen, power(s, facing, shiny.exponent) * shiny.strength, zero);
+                    for (gloss, specular) in gloss.iter_mut().zip(headlight.specular) {
+                        *gloss += shine * specular;
+                    }
+                }
             }
-            // Ambient light has no shadow, and belongs to the first pass.
-            for (k, diffuse) in diffuse.iter_mut().enumerate() {
-                *diffuse += strength * light.ambient[k];
+            // The sum of all further passes, each clamped.
+            let mut passes = V3::splat(s, [0.0; 3]);
+            for prepared in lighting.lights.iter().filter(|_| corner_light.is_none()) {
+                let light = &prepared.light;
+                let Some((to, strength)) = prepared.illumination(s, at.position, lanes) else { continue };
+                let facing = max(n.dot(to), zero);
+                let mut lit = strength;
+                let mut ambient_light = strength;
+                // The ambient light of a light with shadows matters on its dark side, too.
+                let matters = {
+                    #[inline(always)]
+                    || {
+                        let has_ambient = scene.opengl.is_some() && light.ambient != [0.0; 3];
+                        lanes & if has_ambient { strength } else { facing * strength }.simd_gt(splat(s, 1e-4))
+                    }
+                };
+                if let Some(map) = prepared.shadow.filter(|_| receives_shadows).and_then(|k| shadows.get(k)) {
+                    let matters = matters();
+                    if matters.any_true() {
+                        let seen = map.visibility(s, at.position, at.normal, source.placed.error, matters);
+                        let seen = if scene.opengl.is_some() { whole(s, seen) } else { seen };
+                        (lit, ambient_light) = (lit * seen, ambient_light * seen);
+                    }
+                }
+                if let Some(rays) = shadow_rays.filter(|rays| rays.shadows && light.cast_shadow && receives_shadows) {
+                    let matters = matters();
+                    if matters.any_true() {
+                        let seen = rays.visibility(s, light, prepared.along.map(|x| -x), at.point(), matters);
+                        (lit, ambient_light) = (lit * seen, ambient_light * seen);
+                    }
+                }
+                let own_pass = prepared.own_pass && receives_shadows;
+                let mut pass_gloss = [zero, zero, zero];
+                let gloss = if own_pass { &mut pass_gloss } else { &mut gloss };
+                if !own_pass {
+                    for (k, diffuse) in diffuse.iter_mut().enumerate() {
+                        *diffuse += facing * lit * light.diffuse[k] + strength * light.ambient[k];
+                    }
+                }
+                if shiny.is_visible(light.specular) {
+                    // The cosine between the normal and the half vector, compared before its root is taken.
+                    let half = to.sub(match eye {
+                        None => view,
+                        Some(eye) => at.position.sub(V3::splat(s, eye)).unit(s),
+                    });
+                    let (along, square) = (n.dot(half), half.dot(half));
+                    let bright = (along * along).simd_gt(square * (shiny.faint * shiny.faint));
+                    let seen = lanes & bright & along.simd_gt(zero) & facing.simd_gt(zero);
+                    if seen.any_true() {
+                        let cosine = along / select(seen, square, splat(s, 1.0)).sqrt();
+                        let shine = select(seen, power(s, cosine, shiny.exponent) * shiny.strength, zero);
+                        for (gloss, specular) in gloss.iter_mut().zip(light.specular) {
+                            *gloss += shine * lit * specular;
+                        }
+                    }
+                }
+                if own_pass {
+                    let (bright, one) = (facing * lit, splat(s, 1.0));
+                    if scene.opengl.is_some() {
+                        let [r, g, b] = [0, 1, 2].map(|k| bright * light.diffuse[k] + ambient_light * light.ambient[k]);
+                        passes.x += min(base.x * r + pass_gloss[0], one);
+                        passes.y += min(base.y * g + pass_gloss[1], one);
+                        passes.z += min(base.z * b + pass_gloss[2], one);
+                        continue;
+                    }
+                    // Ambient light has no shadow, and belongs to the first pass.
+                    for (k, diffuse) in diffuse.iter_mut().enumerate() {
+                        *diffuse += strength * light.ambient[k];
+                    }
+                    passes.x += min(base.x * bright * light.diffuse[0] + pass_gloss[0], one);
+                    passes.y += min(base.y * bright * light.diffuse[1] + pass_gloss[1], one);
+                    passes.z += min(base.z * bright * light.diffuse[2] + pass_gloss[2], one);
+                }
             }
-            passes.x += min(base.x * bright * light.diffuse[0] + pass_gloss[0], one);
-            passes.y += min(base.y * bright * light.diffuse[1] + pass_gloss[1], one);
-            passes.z += min(base.z * bright * light.diffuse[2] + pass_gloss[2], one);
-        }
-    }
-    let one = splat(s, 1.0);
-    let plain = {
-        #[inline(always)]
-        |gloss: [F<S>; 3]| V3 {
-            x: base.x * diffuse[0] + gloss[0],
-            y: base.y * diffuse[1] + gloss[1],
-            z: base.z * diffuse[2] + gloss[2],
-        }
-    };
-    let mut color = if display {
-        // OpenGL clamps the sum at 1, highlights included, and multiplies the result by the texture.
-        let lit = match corner_light {
-            Some(lit) => lit,
-            None => {
-                let sum = plain(gloss);
-                V3 { x: min(max(sum.x, zero), one), y: min(max(sum.y, zero), one), z: min(max(sum.z, zero), one) }
-                    .add(passes)
+            let one = splat(s, 1.0);
+            let plain = {
+                #[inline(always)]
+                |gloss: [F<S>; 3]| V3 {
+                    x: base.x * diffuse[0] + gloss[0],
+                    y: base.y * diffuse[1] + gloss[1],
+                    z: base.z * diffuse[2] + gloss[2],
+                }
+            };
+            let mut color = if display {
+                // OpenGL clamps the sum at 1, highlights included, and multiplies the result by the texture.
+                let lit = match corner_light {
+                    Some(lit) => lit,
+                    None => {
+                        let sum = plain(gloss);
+                        V3 {
+                            x: min(max(sum.x, zero), one),
+                            y: min(max(sum.y, zero), one),
+                            z: min(max(sum.z, zero), one),
+                        }
+                        .add(passes)
+                    }
+                };
+                let (r, g, b) = (lit.x * 255.0, lit.y * 255.0, lit.z * 255.0);
+                let texture_rays = (view, image_axes.map(|axes| (axes, distance)));
+                let (r, g, b) = match texels(s, source, lighting.mip_rule, at, texture_rays, pixel, lanes) {
+                    Some([x, y, z]) => (r * x * (1.0 / 255.0), g * y * (1.0 / 255.0), b * z * (1.0 / 255.0)),
+                    None => (r, g, b),
+                };
+                let most = splat(s, 255.0);
+                let (r, g, b) = (min(r, most), min(g, most), min(b, most));
+                let blend = lighting.blend;
+                V3 { x: blend.color_of_bytes(r), y: blend.color_of_bytes(g), z: blend.color_of_bytes(b) }
+            } else if material.metallic > 0.0 {
+                // Mirrored light, tinted by the metal's color, and emission; without a traced mirror, the sky is mirrored.
+                let mirrored = sky(s, lighting, view.sub(n.scale(n.dot(view) * 2.0)), pixel.angle());
+                let metal = V3 {
+                    x: base.x * (mirrored.x + gloss[0] + material.emission),
+                    y: base.y * (mirrored.y + gloss[1] + material.emission),
+                    z: base.z * (mirrored.z + gloss[2] + material.emission),
+                };
+                let k = splat(s, material.metallic.min(1.0));
+                plain(gloss.map(|light| light * material.specular)).scale(1.0 - k).add(metal.scale(k))
+            } else {
+                plain(gloss)
+            };
+            if let Some(haze) = scene.haze {
+                // OpenGL's fog depends on the depth.
+                let distance = if scene.opengl.is_some() { at.t } else { distance };
+                let k = (distance - haze.start) / (haze.end - haze.start).max(1e-6);
+                let k = min(max(k, zero), splat(s, 1.0));
+                // OpenGL's fog is linear.
+                let k = if scene.opengl.is_some() { k } else { k * k * (3.0 - k * 2.0) };
+                let behind = match lighting.haze {
+                    Some(c) => V3::splat(s, c),
+                    None => sky(s, lighting, V3 { x: view.x, y: view.y, z: max(view.z, zero) }, pixel.angle()),
+                };
+                color = color.scale(1.0 - k).add(behind.scale(k));
             }
-        };
-        let (r, g, b) = (lit.x * 255.0, lit.y * 255.0, lit.z * 255.0);
-        let texture_rays = (view, image_axes.map(|axes| (axes, distance)));
-        let (r, g, b) = match texels(s, source, lighting.mip_rule, at, texture_rays, pixel, lanes) {
-            Some([x, y, z]) => (r * x * (1.0 / 255.0), g * y * (1.0 / 255.0), b * z * (1.0 / 255.0)),
-            None => (r, g, b),
-        };
-        let most = splat(s, 255.0);
-        let (r, g, b) = (min(r, most), min(g, most), min(b, most));
-        let blend = lighting.blend;
-        V3 { x: blend.color_of_bytes(r), y: blend.color_of_bytes(g), z: blend.color_of_bytes(b) }
-    } else if material.metallic > 0.0 {
-        // Mirrored light, tinted by the metal's color, and emission; without a traced mirror, the sky is mirrored.
-        let mirrored = sky(s, lighting, view.sub(n.scale(n.dot(view) * 2.0)), pixel.angle());
-        let metal = V3 {
-            x: base.x * (mirrored.x + gloss[0] + material.emission),
-            y: base.y * (mirrored.y + gloss[1] + material.emission),
-            z: base.z * (mirrored.z + gloss[2] + material.emission),
-        };
-        let k = splat(s, material.metallic.min(1.0));
-        plain(gloss.map(|light| light * material.specular)).scale(1.0 - k).add(metal.scale(k))
-    } else {
-        plain(gloss)
-    };
-    if let Some(haze) = scene.haze {
-        // OpenGL's fog depends on the depth.
-        let distance = if scene.opengl.is_some() { at.t } else { distance };
-        let k = (distance - haze.start) / (haze.end - haze.start).max(1e-6);
-        let k = min(max(k, zero), splat(s, 1.0));
-        // OpenGL's fog is linear.
-        let k = if scene.opengl.is_some() { k } else { k * k * (3.0 - k * 2.0) };
-        let behind = match lighting.haze {
-            Some(c) => V3::splat(s, c),
-            None => sky(s, lighting, V3 { x: view.x, y: view.y, z: max(view.z, zero) }, pixel.angle()),
-        };
-        color = color.scale(1.0 - k).add(behind.scale(k));
-    }
-    color
+            color
+        },
+    )
 }
 
 /// Linear base color of a surface.

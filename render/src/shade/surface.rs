@@ -88,7 +88,9 @@ pub(crate) struct CameraRays<S: Simd> {
 
 /// Surfaces at the rays of the selected lanes, given by their ids in the visibility buffer; all belong to this
 /// instance.
-#[inline(always)]
+///
+/// A function of its own, because the compile time of a function grows faster than its size.
+#[inline(never)]
 pub(crate) fn surface<S: Simd>(
     s: S,
     projection: &Projection,
@@ -97,53 +99,58 @@ pub(crate) fn surface<S: Simd>(
     lanes: M<S>,
     rays: CameraRays<S>,
 ) -> Surface<S> {
-    let CameraRays { uv: [u, v], lens_rays, origin, direction } = rays;
-    let camera = &source.placed.local.instance_from_camera;
-    let (o, d) = match lens_rays {
-        None => projection.rays(s, &source.placed.local, u, v),
-        Some(ray) => (V3::splat(s, camera.translation), ray.direction.rotate(&camera.rotation)),
-    };
-    let zero = splat(s, 0.0);
-    let (t, normal, shading, uv, uv_density);
-    let mut shares = [zero; 3];
-    if let Some(mesh) = source.placed.mesh(source.instance) {
-        let [x, y, z] = &camera.rotation;
-        let axis = match lens_rays {
-            Some(LensRayLanes { forward: false, .. }) => d.scale(1.0 / d.dot(d)),
-            _ => V3::splat(s, [x[2], y[2], z[2]]),
-        };
-        let hit = intersect_triangles(s, mesh, source.first_id, ids, lanes, o, d, axis);
-        (t, normal, shading, uv, uv_density) = (hit.t, hit.normal, hit.shading, hit.uv, hit.uv_density);
-        shares = hit.shares;
-    } else {
-        let hit = primitive::intersect(s, &source.instance.shape, o, d, projection.near);
-        t = hit.t;
-        // Other shapes have a unit normal already.
-        normal = match source.instance.shape {
-            Shape::Plane(_) | Shape::Box(_) => hit.normal,
-            _ => hit.normal.unit(s),
-        };
-        shading = normal;
-        uv = [zero, zero];
-        uv_density = splat(s, 1.0);
-    }
-    let back = normal.dot(d).simd_gt(zero);
-    let flip = select(back, splat(s, -1.0), splat(s, 1.0));
-    let world = source.world_from_instance;
-    let local_position = o.add(d.scale(t));
-    // From the camera outward, as for the depth: both agree to the last digits.
-    let eye = V3::splat(s, projection.world_from_camera.translation);
-    let position = direction.scale(t).add(if projection.parallel { eye.add(origin) } else { eye });
-    Surface {
-        t,
-        normal: normal.scale(flip).rotate(&world.rotation),
-        shading_normal: shading.scale(flip).rotate(&world.rotation),
-        position,
-        local_position,
-        uv,
-        uv_density,
-        shares,
-    }
+    s.vectorize(
+        #[inline(always)]
+        || {
+            let CameraRays { uv: [u, v], lens_rays, origin, direction } = rays;
+            let camera = &source.placed.local.instance_from_camera;
+            let (o, d) = match lens_rays {
+                None => projection.rays(s, &source.placed.local, u, v),
+                Some(ray) => (V3::splat(s, camera.translation), ray.direction.rotate(&camera.rotation)),
+            };
+            let zero = splat(s, 0.0);
+            let (t, normal, shading, uv, uv_density);
+            let mut shares = [zero; 3];
+            if let Some(mesh) = source.placed.mesh(source.instance) {
+                let [x, y, z] = &camera.rotation;
+                let axis = match lens_rays {
+                    Some(LensRayLanes { forward: false, .. }) => d.scale(1.0 / d.dot(d)),
+                    _ => V3::splat(s, [x[2], y[2], z[2]]),
+                };
+                let hit = intersect_triangles(s, mesh, source.first_id, ids, lanes, o, d, axis);
+                (t, normal, shading, uv, uv_density) = (hit.t, hit.normal, hit.shading, hit.uv, hit.uv_density);
+                shares = hit.shares;
+            } else {
+                let hit = primitive::intersect(s, &source.instance.shape, o, d, projection.near);
+                t = hit.t;
+                // Other shapes have a unit normal already.
+                normal = match source.instance.shape {
+                    Shape::Plane(_) | Shape::Box(_) => hit.normal,
+                    _ => hit.normal.unit(s),
+                };
+                shading = normal;
+                uv = [zero, zero];
+                uv_density = splat(s, 1.0);
+            }
+            let back = normal.dot(d).simd_gt(zero);
+            let flip = select(back, splat(s, -1.0), splat(s, 1.0));
+            let world = source.world_from_instance;
+            let local_position = o.add(d.scale(t));
+            // From the camera outward, as for the depth: both agree to the last digits.
+            let eye = V3::splat(s, projection.world_from_camera.translation);
+            let position = direction.scale(t).add(if projection.parallel { eye.add(origin) } else { eye });
+            Surface {
+                t,
+                normal: normal.scale(flip).rotate(&world.rotation),
+                shading_normal: shading.scale(flip).rotate(&world.rotation),
+                position,
+                local_position,
+                uv,
+                uv_density,
+                shares,
+            }
+        },
+    )
 }
 
 struct TriangleHit<S: Simd> {

@@ -44,7 +44,9 @@ pub(crate) fn floor_lanes<S: Simd>(s: S, x: F<S>) -> F<S> {
 }
 
 /// Colors (bytes, 0..=255) at (u, v), v upward, where one pixel is `footprint` wide in texture coordinates.
-#[inline(always)]
+///
+/// Compiled once for each instruction set, not in each of its callers.
+#[inline(never)]
 pub(crate) fn sample<S: Simd>(
     s: S,
     texture: &Texture,
@@ -53,31 +55,38 @@ pub(crate) fn sample<S: Simd>(
     footprint: F<S>,
     lanes: M<S>,
 ) -> [F<S>; 3] {
-    let first = &texture.mip_levels()[0];
-    let (zero, one, limit) = (splat(s, 0.0), splat(s, 1.0), splat(s, 1e6));
-    let lanes = lanes & abs(u).simd_lt(limit) & abs(v).simd_lt(limit);
-    let (u, v) = (select(lanes, u, zero), select(lanes, v, zero));
-    let (u, v) = (u - floor_lanes(s, u), one - (v - floor_lanes(s, v)));
-    let texels = footprint * first.width().max(first.height()) as f32;
-    sample_levels(
-        s,
-        texture,
-        rule,
-        texels,
-        lanes,
+    s.vectorize(
         #[inline(always)]
-        |level, wanted| {
-            let (w, h) = (level.width() as f32, level.height() as f32);
-            let (x, y) = (u * w - 0.5, v * h - 0.5);
-            let (ix, iy) = (floor_lanes(s, x), floor_lanes(s, y));
-            bilinear(s, level, [wrap(s, ix, w), wrap(s, iy, h)], [x - ix, y - iy], wanted)
+        || {
+            let first = &texture.mip_levels()[0];
+            let (zero, one, limit) = (splat(s, 0.0), splat(s, 1.0), splat(s, 1e6));
+            let lanes = lanes & abs(u).simd_lt(limit) & abs(v).simd_lt(limit);
+            let (u, v) = (select(lanes, u, zero), select(lanes, v, zero));
+            let (u, v) = (u - floor_lanes(s, u), one - (v - floor_lanes(s, v)));
+            let texels = footprint * first.width().max(first.height()) as f32;
+            sample_levels(
+                s,
+                texture,
+                rule,
+                texels,
+                lanes,
+                #[inline(always)]
+                |level, wanted| {
+                    let (w, h) = (level.width() as f32, level.height() as f32);
+                    let (x, y) = (u * w - 0.5, v * h - 0.5);
+                    let (ix, iy) = (floor_lanes(s, x), floor_lanes(s, y));
+                    bilinear(s, level, [wrap(s, ix, w), wrap(s, iy, h)], [x - ix, y - iy], wanted)
+                },
+            )
         },
     )
 }
 
 /// Colors (bytes, 0..=255) in directions of a cube texture, where one pixel is `footprint` wide on a cube of half
 /// length 1.
-#[inline(always)]
+///
+/// Compiled once for each instruction set, not in each of its callers.
+#[inline(never)]
 pub(crate) fn sample_cube<S: Simd>(
     s: S,
     texture: &Texture,
@@ -86,43 +95,48 @@ pub(crate) fn sample_cube<S: Simd>(
     footprint: F<S>,
     lanes: M<S>,
 ) -> [F<S>; 3] {
-    let zero = splat(s, 0.0);
-    let (ax, ay, az) = (abs(d.x), abs(d.y), abs(d.z));
-    let by_x = ax.simd_ge(ay) & ax.simd_ge(az);
-    let by_y = !by_x & ay.simd_ge(az);
-    let axis = {
+    s.vectorize(
         #[inline(always)]
-        |x: F<S>, y: F<S>, z: F<S>| select(by_x, x, select(by_y, y, z))
-    };
-    let major = axis(ax, ay, az);
-    // Faces +x, -x, +y, -y, +z, -z, from top to bottom of the image.
-    let positive = axis(d.x, d.y, d.z).simd_gt(zero);
-    let face = axis(zero, splat(s, 2.0), splat(s, 4.0)) + select(positive, zero, splat(s, 1.0));
-    let turned = {
-        #[inline(always)]
-        |x: F<S>| select(positive, x, -x)
-    };
-    let (u, v) = (axis(-turned(d.z), d.x, turned(d.x)), axis(-d.y, turned(d.z), -d.y));
-    let k = 0.5 / select(major.simd_gt(zero), major, splat(s, 1.0));
-    let (u, v) = (u * k + 0.5, v * k + 0.5);
-    let texels = footprint * (0.5 * texture.mip_levels()[0].width() as f32);
-    sample_levels(
-        s,
-        texture,
-        rule,
-        texels,
-        lanes,
-        #[inline(always)]
-        |level, wanted| {
-            let side = level.width() as f32;
-            // Clamped: texels are not blended across the edge of a face.
-            let inside = {
+        || {
+            let zero = splat(s, 0.0);
+            let (ax, ay, az) = (abs(d.x), abs(d.y), abs(d.z));
+            let by_x = ax.simd_ge(ay) & ax.simd_ge(az);
+            let by_y = !by_x & ay.simd_ge(az);
+            let axis = {
                 #[inline(always)]
-                |x: F<S>| min(max(x * side - 0.5, zero), splat(s, side - 1.0))
+                |x: F<S>, y: F<S>, z: F<S>| select(by_x, x, select(by_y, y, z))
             };
-            let (x, y) = (inside(u), inside(v));
-            let (ix, iy) = (floor_lanes(s, x), floor_lanes(s, y));
-            bilinear(s, level, [ix, iy + face * side], [x - ix, y - iy], wanted)
+            let major = axis(ax, ay, az);
+            // Faces +x, -x, +y, -y, +z, -z, from top to bottom of the image.
+            let positive = axis(d.x, d.y, d.z).simd_gt(zero);
+            let face = axis(zero, splat(s, 2.0), splat(s, 4.0)) + select(positive, zero, splat(s, 1.0));
+            let turned = {
+                #[inline(always)]
+                |x: F<S>| select(positive, x, -x)
+            };
+            let (u, v) = (axis(-turned(d.z), d.x, turned(d.x)), axis(-d.y, turned(d.z), -d.y));
+            let k = 0.5 / select(major.simd_gt(zero), major, splat(s, 1.0));
+            let (u, v) = (u * k + 0.5, v * k + 0.5);
+            let texels = footprint * (0.5 * texture.mip_levels()[0].width() as f32);
+            sample_levels(
+                s,
+                texture,
+                rule,
+                texels,
+                lanes,
+                #[inline(always)]
+                |level, wanted| {
+                    let side = level.width() as f32;
+                    // Clamped: texels are not blended across the edge of a face.
+                    let inside = {
+                        #[inline(always)]
+                        |x: F<S>| min(max(x * side - 0.5, zero), splat(s, side - 1.0))
+                    };
+                    let (x, y) = (inside(u), inside(v));
+                    let (ix, iy) = (floor_lanes(s, x), floor_lanes(s, y));
+                    bilinear(s, level, [ix, iy + face * side], [x - ix, y - iy], wanted)
+                },
+            )
         },
     )
 }
