@@ -575,7 +575,7 @@ impl LocalCameraRays {
                 drawn = true;
             }
         }
-        debug_assert!(first_id != NO_ID);
+        assert!(first_id != NO_ID, "an instance has the id of nothing");
         drawn
     }
 }

@@ -134,7 +134,7 @@ impl SensorCfg for ContactSensorCfg {
         if layout.air {
             channels.extend(ContactTimers::CHANNELS.map(|(name, unit)| counts(name, b).with_unit(unit)));
         }
-        debug_assert_eq!(channels.iter().map(|c| c.width).sum::<usize>(), value_count(&layout));
+        assert_eq!(channels.iter().map(|c| c.width).sum::<usize>(), value_count(&layout));
         Ok(ContactSensor {
             names: bodies.iter().map(|&body| context.bodies[body].clone()).collect(),
             filters: self.filters.clone(),
