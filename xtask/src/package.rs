@@ -5,6 +5,9 @@ use crate::run::{Failure, Repo, XtaskResult, in_ci, no_findings};
 use crate::setup::Prepared;
 use crate::test;
 use serde_json::Value;
+use std::fs::{self, Permissions};
+use std::io;
+use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 
 /// The package that users depend on.
@@ -40,7 +43,8 @@ pub(crate) fn docs_rs(repo: &Repo, ready: &Prepared) -> XtaskResult {
     // CI shares the compiled dependencies with other stages. Elsewhere, the pages would replace those of `cargo doc`.
     let folder = if in_ci() { repo.target.clone() } else { repo.target.join("docs-rs") };
     let cargo = ready.cargo().env("DOCS_RS", "1").env("MUJOCO_DIR", repo.target.join("without-mujoco"));
-    let cargo = cargo.env("CARGO_TARGET_DIR", &folder).env("RUSTDOCFLAGS", "-D warnings");
+    let cargo = cargo.env("CARGO_TARGET_DIR", &folder).env("RUSTDOCFLAGS", "-D warnings --cfg docsrs");
+    let cargo = cargo.env("RUSTDOC", rustdoc_as_nightly(&folder)?);
     let features: Vec<String> =
         docs_rs_features(&repo.metadata)?.iter().map(|name| format!("{FACADE}/{name}")).collect();
     cargo
@@ -48,6 +52,17 @@ pub(crate) fn docs_rs(repo: &Repo, ready: &Prepared) -> XtaskResult {
         .args(test::SHARED_FEATURES)
         .args(["--features", &features.join(",")])
         .run()
+}
+
+/// A program that calls rustdoc with the unstable features that docs.rs has, such as the names of features beside items.
+/// Only rustdoc gets the variable for them: build scripts would choose other features, and compile the dependencies again.
+fn rustdoc_as_nightly(folder: &Path) -> XtaskResult<PathBuf> {
+    let program = folder.join("rustdoc-as-nightly");
+    let fail = |e: io::Error| Failure::new(format!("{}: {e}", program.display()));
+    fs::create_dir_all(folder).map_err(fail)?;
+    fs::write(&program, "#!/bin/sh\nRUSTC_BOOTSTRAP=1 exec rustdoc \"$@\"\n").map_err(fail)?;
+    fs::set_permissions(&program, Permissions::from_mode(0o755)).map_err(fail)?;
+    Ok(program)
 }
 
 /// Features that docs.rs enables for the facade.
