@@ -17,6 +17,7 @@ os.environ["RAY_worker_niceness"] = "0"
 
 def pytest_configure(config):
     config.addinivalue_line("markers", "needs_seeds: needs the tutorials of EmbodiChain and Orbit in KINETOSCOPE_SEEDS")
+    config.addinivalue_line("markers", "needs_robots: needs the vendors' robots in KINETOSCOPE_ROBOTS")
     config.addinivalue_line("markers", "needs_warp: needs mujoco-warp and warp-lang")
     config.addinivalue_line("markers", "needs_learning: needs torch and the libraries of kinetoscope.rl")
 

@@ -216,3 +216,26 @@ def test_forces_of_users(tmp_path):
     found = physics.read("qpos")
     assert np.abs(found[[0, 2]] - judge.data.qpos).max() < POSITION
     assert np.abs(found[1] - judge.data.qpos).max() > 50 * POSITION
+
+
+# Rows of the solver: 2500/s^2, the stiffness of contacts at the default time constant, times the rounding of positions near 1 m;
+# 10 rows, over 0.2 s.
+SLIP = 10 * 2500 * EPS * 0.2**2 / 2
+
+
+@pytest.mark.parametrize("cone", ["elliptic", "pyramidal"])
+@pytest.mark.parametrize(("friction", "fall"), [(1.0, 0.0), (0.1, 9.81 - 2 * 0.1 * 5 / 0.2)], ids=["held", "slips"])
+def test_grip(friction, fall, cone, tmp_path):
+    """A box between two fingers: with a coefficient below 0.2, friction of 5 N on both sides does not carry its weight."""
+    physics, judge, _ = load(tmp_path, scenes.grip_xml(friction, cone=cone, impratio=10))
+    target = np.full(2, 0.05, np.float32)
+    physics.write("target_position", None, repeat(target))
+    judge.target_position = target.astype(float)
+    step(physics, 20)
+    for _ in range(20):
+        judge.step()
+    way = 1 - physics.read("qpos")[:, 4]
+    assert np.abs(way - (1 - judge.data.qpos[4])).max() < SLIP
+    # Semi-implicit steps: t (t + h) / 2. The fingers push from the second step on: without that friction for one step, the box
+    # gains 5 m/s^2 * 0.01 s, over 0.2 s. Held boxes creep.
+    assert abs(way[0] - fall * 0.2 * 0.21 / 2) < 0.01

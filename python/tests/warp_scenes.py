@@ -66,6 +66,22 @@ def box_xml(**options):
     )
 
 
+def grip_xml(friction, **options):
+    """Two fingers whose drives push with up to 5 N each on a tall box of 0.2 kg between them, above the ground."""
+    fingers = "".join(
+        f'<body name="finger{side}" pos="{x} 0 1"><inertial pos="0 0 0" mass="0.1" diaginertia="1e-4 1e-4 1e-4"/>'
+        f'<joint name="f{side}" type="slide" axis="{axis} 0 0"/>'
+        f'<geom type="sphere" size="0.01" friction="{friction} 0.005 0.0001" contype="2" conaffinity="1"/></body>'
+        for side, x, axis in (("a", -0.04, 1), ("b", 0.04, -1))
+    )
+    box = (
+        '<body name="box" pos="0 0 1"><freejoint/><inertial pos="0 0 0" mass="0.2" diaginertia="1e-4 1e-4 1e-4"/>'
+        f'<geom type="box" size="0.03 0.03 0.15" friction="{friction} 0.005 0.0001"/></body>'
+    )
+    servos = "".join(SERVO.format(f"f{side}", 1000, 20, 5) for side in "ab")
+    return f"{head(**options)}{fingers}{box}</worldbody><actuator>{servos}</actuator></mujoco>"
+
+
 def drives_of(model):
     """Drives of the position servos in an exported scene: their gains and limits are those of the actuators."""
     drives = []

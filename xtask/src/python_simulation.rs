@@ -3,6 +3,7 @@
 
 use crate::python;
 use crate::python_package::{self, BuildProfile, built_wheel, create, maturin, remove_wheels, wheels};
+use crate::robots;
 use crate::run::{Cmd, Failure, Repo, XtaskResult};
 use crate::setup::{self, MujocoVersion, Prepared, Requirement, Requirements};
 use crate::{test, wheel};
@@ -135,6 +136,12 @@ fn run_tests(repo: &Repo, ready: &Prepared, python: &Path) -> XtaskResult {
     } else {
         println!("note: without the scripts of other simulators ({SCRIPTS}), their tests are left out");
         left_out.push("not needs_seeds");
+    }
+    if let Some(robots) = robots::local(repo) {
+        tests = tests.env(robots::VARIABLE, robots);
+    } else {
+        println!("note: without the robots of {}, their tests are left out", robots::VARIABLE);
+        left_out.push("not needs_robots");
     }
     tests
         .args(["-m", &left_out.join(" and ")])

@@ -60,6 +60,8 @@ class Worlds:
             raise UnsupportedSceneError(f"MuJoCo Warp does not support the scene: {error}") from error
         # It would print a line for each environment and step.
         self.model.opt.warn_overflow = 0
+        # Newton starts from the accelerations of the last step; those without constraints, and their factorization, are not read.
+        self.model.opt.run_qacc_smooth = False
         self.rows, self.contacts = sizes.initial_sizes(mjm)
         self.data = self.make_data(self.rows, self.contacts)
         n, drives, damped = num_envs, len(scene.dof), len(scene.damped)
