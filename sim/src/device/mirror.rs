@@ -1,153 +1,16 @@
 //! The rows of all environments and their copies on a device.
 
 use super::captured::{CONTACT_NUMBERS, DeviceBodies, contacts_by_env};
+use super::inputs::Input;
+use super::model_writes::{ModelWrites, add_model_writes};
 use super::{DeviceError, DevicePhysics, DeviceScene, StepReport};
 use crate::capture::CaptureRequest;
-use crate::drive::actuator;
 use crate::drive::table::{DriveTable, Realization};
 use crate::env::{Divergence, EnvStatus};
 use crate::row::{EnvRow, StoredRow};
-use kinetoscope_mujoco::{EngineError, Model, ModelPatch, NumberArray, Warning};
+use kinetoscope_mujoco::{EngineError, Model, ModelPatch, Warning};
 use kinetoscope_scene::StateFields;
-use std::collections::BTreeMap;
 use std::sync::Arc;
-
-/// Largest effort in single precision, for drives without a limit: products with it stay finite.
-const UNLIMITED: f64 = 1e9;
-
-/// Arrays of the model that can differ between the environments of a device.
-const MODEL_ARRAYS: [NumberArray; 15] = [
-    NumberArray::BODY_MASS,
-    NumberArray::BODY_SUBTREEMASS,
-    NumberArray::BODY_INERTIA,
-    NumberArray::BODY_IPOS,
-    NumberArray::BODY_IQUAT,
-    NumberArray::BODY_POS,
-    NumberArray::BODY_QUAT,
-    NumberArray::BODY_INVWEIGHT0,
-    NumberArray::DOF_ARMATURE,
-    NumberArray::DOF_DAMPING,
-    NumberArray::DOF_FRICTIONLOSS,
-    NumberArray::DOF_INVWEIGHT0,
-    NumberArray::TENDON_FRICTIONLOSS,
-    NumberArray::TENDON_INVWEIGHT0,
-    NumberArray::GEOM_FRICTION,
-];
-
-/// Arrays that change together with properties and that the physics of the device does not read.
-const UNREAD_ARRAYS: [&str; 8] = [
-    "actuator_acc0",
-    "actuator_length0",
-    "cam_pos0",
-    "cam_poscom0",
-    "dof_M0",
-    "geom_rgba",
-    "light_pos0",
-    "light_poscom0",
-];
-
-/// Input of the device with a row per environment.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Input {
-    Positions,
-    Velocities,
-    Activations,
-    WarmStart,
-    Controls,
-    JointForces,
-    BodyForces,
-    MocapPositions,
-    MocapOrientations,
-    Stiffness,
-    Damping,
-    MaxEffort,
-    TargetPosition,
-    TargetVelocity,
-    Feedforward,
-    ViscousDamping,
-}
-
-impl Input {
-    const ALL: [Self; 16] = [
-        Self::Positions,
-        Self::Velocities,
-        Self::Activations,
-        Self::WarmStart,
-        Self::Controls,
-        Self::JointForces,
-        Self::BodyForces,
-        Self::MocapPositions,
-        Self::MocapOrientations,
-        Self::Stiffness,
-        Self::Damping,
-        Self::MaxEffort,
-        Self::TargetPosition,
-        Self::TargetVelocity,
-        Self::Feedforward,
-        Self::ViscousDamping,
-    ];
-
-    /// Name of the array on the device.
-    fn name(self) -> &'static str {
-        match self {
-            Self::Positions => "qpos",
-            Self::Velocities => "qvel",
-            Self::Activations => "act",
-            Self::WarmStart => "qacc_warmstart",
-            Self::Controls => "ctrl",
-            Self::JointForces => "qfrc_applied",
-            Self::BodyForces => "xfrc_applied",
-            Self::MocapPositions => "mocap_pos",
-            Self::MocapOrientations => "mocap_quat",
-            Self::Stiffness => "stiffness",
-            Self::Damping => "damping",
-            Self::MaxEffort => "max_effort",
-            Self::TargetPosition => "target_position",
-            Self::TargetVelocity => "target_velocity",
-            Self::Feedforward => "feedforward",
-            Self::ViscousDamping => "viscous_damping",
-        }
-    }
-
-    /// True for the state, which steps of the device change.
-    fn is_state(self) -> bool {
-        matches!(self, Self::Positions | Self::Velocities | Self::Activations | Self::WarmStart)
-    }
-
-    /// Appends the values in a row of the batch to `out`.
-    fn append(self, row: &StoredRow<'_>, rows: &[usize], out: &mut Vec<f32>) {
-        let (drives, model) = (&row.row.drives, row.model);
-        let mut put = |values: &[f64]| out.extend(values.iter().map(|x| *x as f32));
-        match self {
-            Self::Positions => put(row.raw_qpos()),
-            Self::Velocities => put(row.qvel()),
-            Self::Activations => put(row.row.motion.act(model)),
-            Self::WarmStart => put(row.qacc_warmstart()),
-            Self::JointForces => put(&drives.applied),
-            Self::BodyForces => put(row.row.body_inputs.xfrc_applied(model)),
-            Self::MocapPositions => put(row.row.body_inputs.mocap(model).0),
-            Self::MocapOrientations => put(row.row.body_inputs.mocap(model).1),
-            Self::Controls => {
-                let first = out.len();
-                out.extend(row.ctrl().iter().map(|x| *x as f32));
-                for (i, drive) in drives.table().drives.iter().enumerate() {
-                    let target = drives.target(i);
-                    out[first + drive.ctrl] = match drive.realization {
-                        Realization::Actuator => actuator::control(&drives.gains[i], &target),
-                        Realization::ConstraintRow | Realization::Explicit { .. } => target.position,
-                    } as f32;
-                }
-            }
-            Self::Stiffness => out.extend(rows.iter().map(|&i| drives.gains[i].kp as f32)),
-            Self::Damping => out.extend(rows.iter().map(|&i| drives.gains[i].kd as f32)),
-            Self::MaxEffort => out.extend(rows.iter().map(|&i| drives.gains[i].max_effort.min(UNLIMITED) as f32)),
-            Self::TargetPosition => out.extend(rows.iter().map(|&i| drives.position[i] as f32)),
-            Self::TargetVelocity => out.extend(rows.iter().map(|&i| drives.velocity[i] as f32)),
-            Self::Feedforward => out.extend(rows.iter().map(|&i| drives.feedforward[i] as f32)),
-            Self::ViscousDamping => put(drives.damping()),
-        }
-    }
-}
 
 /// An input, with the values that the device has.
 #[derive(Debug)]
@@ -171,9 +34,6 @@ pub(crate) trait EnvRows {
     /// Notes that the device has all rows.
     fn set_unchanged(&self);
 }
-
-/// Writes of arrays of the model: environments and their rows, by the name of the array.
-type ModelWrites = BTreeMap<&'static str, (Vec<i32>, Vec<f32>)>;
 
 /// The environments of a batch on a device.
 #[derive(Debug)]
@@ -523,38 +383,4 @@ fn divergence(reason: &str) -> Divergence {
         "qacc" => Divergence::Warning(Warning::BadAcceleration),
         other => Divergence::Engine(EngineError { message: other.into() }),
     }
-}
-
-/// Adds the arrays in which the model of an environment changed.
-fn add_model_writes(
-    env: usize,
-    row: &StoredRow<'_>,
-    before: Option<&ModelPatch>,
-    writes: &mut ModelWrites,
-) -> Result<(), DeviceError> {
-    let now = row.row.patch.as_deref();
-    let mut names: Vec<&str> =
-        before.into_iter().chain(now).flat_map(|patch| patch.arrays().map(|(name, _)| name)).collect();
-    names.sort_unstable();
-    names.dedup();
-    for name in names {
-        if let Some(array) = MODEL_ARRAYS.into_iter().find(|array| array.name() == name) {
-            let (envs, values) = writes.entry(array.name()).or_default();
-            envs.push(env as i32);
-            values.extend(array.all(row.model, now).iter().map(|x| *x as f32));
-        } else if !UNREAD_ARRAYS.contains(&name) {
-            let names: Vec<&str> = MODEL_ARRAYS.iter().map(|array| array.name()).collect();
-            return Err(DeviceError::Unsupported {
-                what: format!("own values of `{name}` in environment {env}"),
-                expected: format!("it can randomize {} and gravity", names.join(", ")),
-            });
-        }
-    }
-    let gravity = |patch: Option<&ModelPatch>| patch.map_or_else(|| row.model.gravity(), ModelPatch::gravity);
-    if gravity(before) != gravity(now) {
-        let (envs, values) = writes.entry("gravity").or_default();
-        envs.push(env as i32);
-        values.extend(gravity(now).map(|x| x as f32));
-    }
-    Ok(())
 }

@@ -10,7 +10,9 @@
 //! ```
 
 mod captured;
+mod inputs;
 mod mirror;
+mod model_writes;
 mod scene;
 #[cfg(test)]
 mod tests;
