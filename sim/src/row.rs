@@ -203,6 +203,19 @@ impl EnvRow {
     }
 }
 
+/// Part of a row that a reader needs. Each part contains the ones before it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum RowPart {
+    /// Inputs, properties and captured quantities, which no device changes.
+    Inputs,
+    /// Steps, time and divergence.
+    Clock,
+    /// Positions, velocities, activations, and accelerations as the start of the next solve.
+    State,
+    /// Results of the last solve: accelerations, forces and efforts.
+    Results,
+}
+
 /// Row outside of working memory, for reads that need no `mjData`.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct StoredRow<'a> {
