@@ -561,7 +561,7 @@ fn load_on_device(
 ) -> std::result::Result<(), (DeviceError, DeviceMirror)> {
     let table = simulation.batch.read_row(0, |row| Arc::clone(row.drives.table()));
     let loaded =
-        DeviceScene::new(cfg, contents, simulation).and_then(|scene| device.load(&scene, &table, cfg.num_envs));
+        DeviceScene::new(cfg, contents, simulation).and_then(|scene| scene.load_on(&mut device, &table, cfg.num_envs));
     match loaded {
         Ok(()) => {
             simulation.batch.set_device(device);

@@ -7,13 +7,14 @@
 use super::captured::{DeviceBodies, DeviceContacts};
 use super::inputs::{Changes, Layout, STATE, SentRows, Write};
 use super::model_writes::{ModelWrites, add_model_writes};
-use super::{DeviceError, DevicePhysics, DeviceScene, StepReport};
+use super::{DeviceError, DevicePhysics, StepReport};
 use crate::capture::CaptureRequest;
 use crate::drive::table::DriveTable;
 use crate::env::{Divergence, EnvStatus};
 use crate::row::{EnvRow, RowPart, StoredRow};
 use kinetoscope_mujoco::{EngineError, Model, Warning};
 use kinetoscope_scene::StateFields;
+use std::path::Path;
 use std::sync::Arc;
 
 /// Rows of a chunk of environments of a batch.
@@ -82,24 +83,9 @@ impl DeviceMirror {
         }
     }
 
-    /// Loads a scene, unless nothing moves in it. All rows are sent before the next step.
-    ///
-    /// # Errors
-    /// The device cannot simulate the scene, failed, or the files of the scene cannot be written to a temporary folder.
-    pub(crate) fn load(
-        &mut self,
-        scene: &DeviceScene<'_>,
-        table: &Arc<DriveTable>,
-        num_envs: usize,
-    ) -> Result<(), DeviceError> {
-        let failed = |error: std::io::Error| DeviceError::Failed(format!("the scene cannot be written: {error}"));
-        if scene.moves() {
-            let folder = tempfile::tempdir().map_err(failed)?;
-            scene.write_to(folder.path()).map_err(failed)?;
-            self.physics.load(folder.path(), scene.json(), num_envs)?;
-        }
-        self.reset_for(table, num_envs);
-        Ok(())
+    /// Loads a scene from its files, as [`DevicePhysics::load`] does.
+    pub(super) fn load(&mut self, folder: &Path, scene: &str, num_envs: usize) -> Result<(), DeviceError> {
+        self.physics.load(folder, scene, num_envs)
     }
 
     /// Forgets what the device has, which is a new scene with the drives of `table`.
