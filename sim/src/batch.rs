@@ -27,7 +27,7 @@ use crate::capture::CaptureRequest;
 use crate::device::{Changes, SentRows};
 use crate::drive::table::{DriveState, DriveTable};
 use crate::env::{SimEnv, Stage};
-use crate::row::{EnvRow, RowPart, StoredRow};
+use crate::row::{EnvRow, RowPart, StoredRow, prefetch_after};
 use kinetoscope_exec::ThreadPool;
 use kinetoscope_mujoco::{Data, Model};
 use std::ops::Range;
@@ -592,12 +592,7 @@ impl LockedChunk<'_> {
         let Chunk { rows, read_values, .. } = &mut *self.chunk;
         for k in 0..rows.len() {
             // The next rows are fetched while this environment steps: first the row, then the arrays it points to.
-            if let Some(next) = rows.get(k + 1) {
-                next.prefetch();
-            }
-            if let Some(after) = rows.get(k + 2) {
-                kinetoscope_mujoco::prefetch(std::slice::from_ref(&**after));
-            }
+            prefetch_after(rows, k, EnvRow::prefetch);
             let row = &mut rows[k];
             let lease = if steps > 0 { Lease::for_step(workspace, row) } else { Lease::new(workspace, row, true) };
             act(self.first + k, lease.workspace, read_values);

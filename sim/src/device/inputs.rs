@@ -3,7 +3,7 @@
 use crate::drive::actuator;
 use crate::drive::gains::Gains;
 use crate::drive::table::{CowArray, DriveTable, Realization};
-use crate::row::{EnvRow, StoredRow};
+use crate::row::{EnvRow, StoredRow, prefetch_after};
 use kinetoscope_mujoco::{BodyInputs, Model, ModelPatch};
 use std::ops::Range;
 use std::sync::Arc;
@@ -305,6 +305,7 @@ impl SentRows {
             self.values.resize(layout.width() * rows.len(), f32::NAN);
         }
         for (k, row) in rows.iter().enumerate() {
+            prefetch_after(rows, k, EnvRow::prefetch_inputs);
             let env = &mut self.envs[k];
             if row.diverged.is_some() {
                 env.has_state = false;

@@ -11,7 +11,7 @@ use super::{DeviceError, DevicePhysics, StepReport};
 use crate::capture::CaptureRequest;
 use crate::drive::table::DriveTable;
 use crate::env::{Divergence, EnvStatus};
-use crate::row::{EnvRow, RowPart, StoredRow};
+use crate::row::{EnvRow, RowPart, StoredRow, prefetch_after};
 use kinetoscope_mujoco::{EngineError, Model, Warning};
 use kinetoscope_scene::StateFields;
 use std::path::Path;
@@ -285,8 +285,9 @@ impl DeviceMirror {
         let row_drives = self.layout.as_ref().map_or(&[][..], Layout::row_drives);
         rows.visit(&|chunk| {
             let mut effort = Vec::with_capacity(table.drives.len());
-            for (k, row) in chunk.rows.iter_mut().enumerate() {
-                let env = chunk.first + k;
+            for k in 0..chunk.rows.len() {
+                prefetch_after(chunk.rows, k, EnvRow::prefetch_results);
+                let (env, row) = (chunk.first + k, &mut *chunk.rows[k]);
                 // The device steps on without a diverged environment. The row is sent again once the environment runs.
                 if row.diverged.is_some() {
                     continue;
