@@ -236,6 +236,28 @@ pub(crate) enum RowPart {
     Results,
 }
 
+/// Array of the state.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum StateArray {
+    /// Positions, with quaternions as they were before a forward pass.
+    Positions,
+    /// Velocities.
+    Velocities,
+    /// Accelerations of the last step, from which the next solve starts.
+    Accelerations,
+}
+
+impl StateArray {
+    /// The array in a row.
+    pub(crate) fn of<'a>(self, row: &'a StoredRow<'_>) -> &'a [f64] {
+        match self {
+            Self::Positions => row.raw_qpos(),
+            Self::Velocities => row.qvel(),
+            Self::Accelerations => row.qacc_warmstart(),
+        }
+    }
+}
+
 /// Row outside of working memory, for reads that need no `mjData`.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct StoredRow<'a> {

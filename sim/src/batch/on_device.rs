@@ -7,7 +7,8 @@ use super::{Batch, Chunk, Lease, LockedChunk, lock};
 use crate::capture::CaptureRequest;
 use crate::device::{Changes, ChunkRows, DeviceError, DeviceMirror, DevicePhysics, EnvRows};
 use crate::env::Stage;
-use crate::row::RowPart;
+use crate::row::{RowPart, StateArray, StoredRow};
+use ndarray::Array2;
 use std::sync::atomic::{AtomicBool, AtomicU8, Ordering};
 use std::sync::{Mutex, PoisonError};
 
@@ -77,6 +78,36 @@ impl Batch {
         {
             device.with_mirror(|mirror| mirror.receive(&self.model, part, self));
         }
+    }
+
+    /// Reads numbers of an array of the state as [`gather_state`](Self::gather_state) does, without bringing rows up to
+    /// date. `None` without a device, if it fails, or if the rows are up to date.
+    pub(super) fn gather_on_device<I: Sync>(
+        &self,
+        array: StateArray,
+        items: &[I],
+        place: &(impl Fn(&I) -> usize + Sync),
+    ) -> Option<Array2<f64>> {
+        let is_behind = |device: &&OnDevice| device.current.load(Ordering::Acquire) < RowPart::State as u8;
+        let device = self.device.as_ref().filter(is_behind)?;
+        let mirror = &mut *lock(&device.mirror);
+        let numbers = mirror.read_state(&self.model, array).ok()?;
+        let (width, model) = (numbers.len() / self.num_envs, &self.model);
+        let mut values = Array2::zeros((self.num_envs, items.len()));
+        self.in_chunks(RowPart::Inputs, values.as_slice_mut()?, |_, taken, out| {
+            for (k, row) in taken.chunk.rows.iter().enumerate() {
+                let out = &mut out[k * items.len()..(k + 1) * items.len()];
+                // The device steps on without a diverged environment.
+                if taken.chunk.sent.has_state(k) {
+                    let numbers = &numbers[(taken.first + k) * width..][..width];
+                    out.iter_mut().zip(items).for_each(|(to, item)| *to = f64::from(numbers[place(item)]));
+                } else {
+                    let row = StoredRow { row, model };
+                    out.iter_mut().zip(items).for_each(|(to, item)| *to = array.of(&row)[place(item)]);
+                }
+            }
+        });
+        Some(values)
     }
 
     /// Does `count` MuJoCo steps on the device, if there is one, and captures the quantities of `capture` in the last one.

@@ -6,7 +6,7 @@
 use super::bodies::StoredBodies;
 use super::{Batch, Chunk, Lease, LockedChunk, lock};
 use crate::env::{SimEnv, Stage};
-use crate::row::{RowPart, StoredRow};
+use crate::row::{RowPart, StateArray, StoredRow};
 use ndarray::{Array2, Array3};
 use std::sync::Mutex;
 
@@ -127,7 +127,7 @@ impl Batch {
 
     /// Runs `job` once for every chunk, in parallel, with working memory and the part of `out` that belongs to the
     /// chunk. Rows are up to date as far as `part`.
-    fn in_chunks<T: Send>(
+    pub(super) fn in_chunks<T: Send>(
         &self,
         part: RowPart,
         out: &mut [T],
@@ -210,6 +210,18 @@ impl Batch {
                 read(c * self.chunks.chunk_size + i, StoredRow { row, model: &self.model });
             }
         }
+    }
+
+    /// Reads a number of the state of each environment for each of `items`, shape (N, items), in parallel. `place` returns
+    /// the index in `array`.
+    pub(crate) fn gather_state<I: Sync>(
+        &self,
+        array: StateArray,
+        items: &[I],
+        place: impl Fn(&I) -> usize + Sync,
+    ) -> Array2<f64> {
+        let on_device = self.gather_on_device(array, items, &place);
+        on_device.unwrap_or_else(|| self.gather_stored(RowPart::State, items, |row, item| array.of(row)[place(item)]))
     }
 
     /// Reads a value of the row of each environment and each of `items`, shape (N, items), in parallel. Rows are up to

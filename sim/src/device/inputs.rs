@@ -378,6 +378,11 @@ impl SentRows {
         std::mem::replace(&mut self.envs[k].patch, patch.cloned())
     }
 
+    /// True if the device has the state of the environment at index `k` of the chunk.
+    pub(crate) fn has_state(&self, k: usize) -> bool {
+        self.envs.get(k).is_some_and(|env| env.has_state)
+    }
+
     /// Makes the step that follows the next change of the environment at index `k` of the chunk send its state.
     pub(super) fn forget_state(&mut self, k: usize) {
         if let Some(env) = self.envs.get_mut(k) {

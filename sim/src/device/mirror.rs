@@ -11,7 +11,7 @@ use super::{DeviceError, DevicePhysics, StepReport};
 use crate::capture::CaptureRequest;
 use crate::drive::table::DriveTable;
 use crate::env::{Divergence, EnvStatus};
-use crate::row::{EnvRow, RowPart, StoredRow, prefetch_after};
+use crate::row::{EnvRow, RowPart, StateArray, StoredRow, prefetch_after};
 use kinetoscope_mujoco::{EngineError, Model, Warning};
 use kinetoscope_scene::StateFields;
 use std::path::Path;
@@ -47,6 +47,8 @@ pub(crate) struct DeviceMirror {
     writes: Vec<Write>,
     /// Arrays of [`STATE`] as last read.
     states: [Vec<f32>; 4],
+    /// True for each of `states` that was read after the last step.
+    are_states_read: [bool; 4],
     /// Largest part that is up to date in all rows.
     current: RowPart,
     /// Steps since clocks were last up to date.
@@ -76,6 +78,7 @@ impl DeviceMirror {
             layout: None,
             writes: Vec::new(),
             states: Default::default(),
+            are_states_read: [false; 4],
             current: RowPart::Results,
             unread_steps: 0,
             failed: None,
@@ -174,6 +177,7 @@ impl DeviceMirror {
             tracing::info!(target: "kinetoscope_sim", rows, contacts, "buffers of the device grew");
         }
         self.current = RowPart::Inputs;
+        self.are_states_read = [false; 4];
         self.unread_steps += u64::from(count);
         if !report.diverged.is_empty() {
             let ended: Vec<(usize, u64, &str)> = report
@@ -246,6 +250,30 @@ impl DeviceMirror {
         }
     }
 
+    /// Reads the array of [`STATE`] with index `k`, unless it was read after the last step.
+    fn update_state(&mut self, model: &Model, k: usize) -> Result<(), DeviceError> {
+        if !self.are_states_read[k] {
+            let widths = [model.nq(), model.nv(), model.na(), model.nv()];
+            self.states[k] = self.read(STATE[k].name(), widths[k])?;
+            self.are_states_read[k] = true;
+        }
+        Ok(())
+    }
+
+    /// Array of the state after the last step, with a row per environment.
+    ///
+    /// # Errors
+    /// The device failed. The next call of [`receive`](Self::receive) freezes the environments.
+    pub(crate) fn read_state(&mut self, model: &Model, array: StateArray) -> Result<&[f32], DeviceError> {
+        let k = match array {
+            StateArray::Positions => 0,
+            StateArray::Velocities => 1,
+            StateArray::Accelerations => 3,
+        };
+        self.update_state(model, k)?;
+        Ok(&self.states[k])
+    }
+
     /// Brings all rows up to date as far as `part`. `ended` lists environments that diverged: environment, steps that it
     /// did since clocks were up to date, and reason.
     fn try_receive(
@@ -262,9 +290,7 @@ impl DeviceMirror {
         let is_missing = |wanted| self.current < wanted && wanted <= part;
         let [clock, state, results] = [RowPart::Clock, RowPart::State, RowPart::Results].map(is_missing);
         if state {
-            for (k, width) in [model.nq(), nv, model.na(), nv].into_iter().enumerate() {
-                self.states[k] = self.read(STATE[k].name(), width)?;
-            }
+            (0..STATE.len()).try_for_each(|k| self.update_state(model, k))?;
         }
         let row_drives = self.layout.as_ref().map_or(0, |layout| layout.row_drives().len());
         let mut read = Results::default();

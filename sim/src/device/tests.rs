@@ -7,7 +7,7 @@ use crate::drive::DriveType;
 use crate::drive::gains::{DriveSetting, Gains};
 use crate::drive::table::{Drive, DriveState, DriveTable, Realization};
 use crate::env::{EnvStatus, Stage};
-use crate::row::RowPart;
+use crate::row::{RowPart, StateArray};
 use kinetoscope_exec::ThreadPool;
 use kinetoscope_mujoco as mj;
 use kinetoscope_scene::StateFields;
@@ -284,7 +284,9 @@ fn reads() {
         }
     };
     let nested: Act = |batch| batch.read_data(1, |_| assert_eq!(state(batch).len(), NUM_ENVS * 18));
-    let cases: [(&str, Act, &[&[&str]]); 9] = [
+    let accelerations: Act = |batch| drop(batch.gather_state(StateArray::Accelerations, &[0_usize], |place| *place));
+    let cases: [(&str, Act, &[&[&str]]); 10] = [
+        ("one array", accelerations, &[&["qacc_warmstart"]]),
         ("nothing", |_| {}, &[]),
         ("time", |batch| batch.for_each_row(RowPart::Clock, |_, row| assert_eq!(row.steps(), 4)), &[]),
         ("targets", |batch| command_drives(batch), &[]),
@@ -334,7 +336,12 @@ fn threads_and_reads() {
             if is_read {
                 state(&batch);
             }
-            command_drives(&mut batch);
+            let dofs: Vec<usize> = (0..7).collect();
+            values.extend(batch.gather_state(StateArray::Velocities, &dofs, |dof| *dof).mapv(f64::to_bits));
+            if k % 2 == 0 {
+                command_drives(&mut batch);
+            }
+            // Before the reset, a diverged environment is read.
             if k == 3 {
                 batch.run_in(&[5, 11, 30], |_, env| env.reset(|data, _| data.qvel_mut()[0] = 0.25));
             }

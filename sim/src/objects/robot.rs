@@ -11,7 +11,7 @@ use crate::ids::EnvId;
 use crate::indexing::{JointIndexing, RobotIndexing};
 use crate::objects::free_body::{FreeBody, FreeBodyMut};
 use crate::objects::rows::{ArgumentSpec, EnvRows, NumberKind, check_unique_indices, unique_envs};
-use crate::row::{RowPart, StoredRow};
+use crate::row::{RowPart, StateArray, StoredRow};
 use crate::sensor_list::SensorList;
 use crate::simulation::Simulation;
 use kinetoscope_mujoco as mj;
@@ -134,13 +134,13 @@ impl<'a> Robot<'a> {
     /// Joint positions \[rad or m\], shape (N, dof).
     #[doc(alias = "get_qpos")]
     pub fn qpos(&self) -> Array2<f64> {
-        self.gather(RowPart::State, |env, joint| env.raw_qpos()[joint.qpos])
+        self.joint_states(StateArray::Positions, |joint| joint.qpos)
     }
 
     /// Joint velocities \[rad/s or m/s\], shape (N, dof).
     #[doc(alias = "get_qvel")]
     pub fn qvel(&self) -> Array2<f64> {
-        self.gather(RowPart::State, |env, joint| env.qvel()[joint.dof])
+        self.joint_states(StateArray::Velocities, |joint| joint.dof)
     }
 
     /// Efforts of the drives in the last MuJoCo step, after the effort limit \[N m or N\], shape (N, dof). They include
@@ -225,6 +225,15 @@ impl<'a> Robot<'a> {
         let link = self.link_id(name)?;
         let frame = self.indexing().links[link.0];
         Ok(self.simulation.batch.body_rows(|bodies| to_row(&frame.pose(bodies))))
+    }
+
+    /// Reads a number of each joint, all with one degree of freedom, from the states of all environments.
+    pub(super) fn joint_states(
+        &self,
+        array: StateArray,
+        place: impl Fn(&JointIndexing) -> usize + Sync,
+    ) -> Array2<f64> {
+        self.simulation.batch.gather_state(array, &self.indexing().joints, place)
     }
 
     /// Reads a number of each joint, all with one degree of freedom, from the rows of all environments.

@@ -10,7 +10,7 @@ use crate::objects::robot::{Robot, RobotMut};
 use crate::objects::robot_data::JointIndex;
 use crate::objects::rows::NumberKind;
 use crate::pattern::{self, PatternError};
-use crate::row::{RowPart, StoredRow};
+use crate::row::{RowPart, StateArray, StoredRow};
 use kinetoscope_robot::description::LinkId;
 use kinetoscope_scene::Pose;
 use kinetoscope_scene::pose::to_row;
@@ -104,7 +104,7 @@ impl Robot<'_> {
     #[doc(alias = "get_qacc")]
     pub fn qacc(&self) -> Array2<f64> {
         // The warm start is the acceleration of the last step, and a new forward pass keeps it.
-        self.gather(RowPart::State, |env, joint| env.qacc_warmstart()[joint.dof])
+        self.joint_states(StateArray::Accelerations, |joint| joint.dof)
     }
 
     /// Velocity targets \[rad/s or m/s\], shape (N, dof); 0 for joints without a drive.
