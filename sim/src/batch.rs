@@ -20,13 +20,14 @@ mod tests;
 pub(crate) use bodies::StoredBodies;
 
 use self::bodies::BodyCache;
+use self::on_device::OnDevice;
 use crate::available_memory::available_memory;
 use crate::batch_error::BatchError;
 use crate::capture::CaptureRequest;
-use crate::device::DeviceMirror;
+use crate::device::{Changes, SentRows};
 use crate::drive::table::{DriveState, DriveTable};
 use crate::env::{SimEnv, Stage};
-use crate::row::{EnvRow, StoredRow};
+use crate::row::{EnvRow, RowPart, StoredRow, prefetch_after};
 use kinetoscope_exec::ThreadPool;
 use kinetoscope_mujoco::{Data, Model};
 use std::ops::Range;
@@ -45,16 +46,12 @@ struct Chunk {
     read_values: Vec<f64>,
     /// Motion of bodies that was read.
     bodies: BodyCache,
-    /// True if the device has all rows, because none was in use since.
-    is_on_device: bool,
-}
-
-impl Chunk {
-    /// Notes that rows may change.
-    fn expect_changes(&mut self) {
-        self.bodies.expect_changes();
-        self.is_on_device = false;
-    }
+    /// Changes since a device got the rows.
+    changes: Changes,
+    /// What the device has of the rows.
+    sent: SentRows,
+    /// True if a row had wrenches when the device got the rows.
+    has_wrenches: bool,
 }
 
 /// A chunk that a thread has locked.
@@ -80,7 +77,7 @@ pub struct Batch {
     /// Growths of buffers in the batches that this one replaces.
     earlier_growths: u64,
     /// Device that steps the environments; `None` for the threads of this process.
-    device: Option<Mutex<DeviceMirror>>,
+    device: Option<OnDevice>,
 }
 
 /// Working memory for reads while that of all threads is in use.
@@ -204,7 +201,9 @@ impl Batch {
                 rows,
                 read_values: Vec::new(),
                 bodies: BodyCache::default(),
-                is_on_device: false,
+                changes: Changes::All,
+                sent: SentRows::default(),
+                has_wrenches: false,
             }));
         }
         let threads = threads.min(count);
@@ -255,15 +254,21 @@ impl Batch {
     }
 
     /// Steps as [`step`](Self::step) does, and captures the quantities of `capture` in the last step. Calls `visit` for
-    /// every environment, in any order, as soon as its data has what `stage` contains.
+    /// every environment, in any order, as soon as its data has what `stage` contains. Without a stage, `visit` does nothing
+    /// and need not be called.
     pub(crate) fn step_and_visit(
         &self,
         count: u32,
         capture: Option<&CaptureRequest>,
-        stage: Stage,
+        stage: Option<Stage>,
         visit: impl Fn(usize, &SimEnv) + Sync,
     ) {
         let count = self.step_on_device(count, capture);
+        let stage = match (count, stage) {
+            (0, None) => return,
+            (0, Some(stage)) => return self.visit(stage, visit),
+            (_, stage) => stage.unwrap_or(Stage::Raw),
+        };
         self.run_chunks(|workspace, taken| {
             taken.for_each_env(workspace, count, |i, env, _| {
                 env.advance(count, capture);
@@ -295,6 +300,7 @@ impl Batch {
         mut outs: [&mut [f64]; K],
     ) {
         let count = self.step_on_device(count, None);
+        self.catch_up(RowPart::Results);
         let widths = self.read_at(0, Stage::Raw, |env| read(env).map(<[f64]>::len));
         for (out, width) in outs.iter().zip(widths) {
             assert!(out.len() == self.num_envs * width, "{} numbers for {} x {width}", out.len(), self.num_envs);
@@ -367,6 +373,7 @@ impl Batch {
         chosen.iter().for_each(|&env| mask[env] = true);
         self.run_chunks(|workspace, taken| {
             let first = taken.first;
+            taken.expect_changes(Changes::All);
             taken.for_each_row(|k, row| {
                 if mask[first + k] {
                     job(first + k, Lease::new(workspace, row, true).workspace);
@@ -386,6 +393,7 @@ impl Batch {
         job: impl Fn(&mut SimEnv, &mut LockedChunk) + Sync,
         then: impl FnMut(&LockedChunk) + Send,
     ) {
+        self.catch_up(RowPart::Results);
         let _running = lock(&self.running);
         let (chunks, workspaces) = (&self.chunks, &self.workspaces);
         for share in &chunks.shares {
@@ -451,7 +459,7 @@ impl Batch {
     /// `index` is not smaller than `num_envs`.
     #[track_caller]
     pub(crate) fn read_at<T>(&self, index: usize, stage: Stage, read: impl FnOnce(&SimEnv) -> T) -> T {
-        self.with_row(index, |row| {
+        self.with_row(index, RowPart::Results, Changes::None, |row| {
             self.with_workspace(row.version, |workspace| {
                 let lease = Lease::new(workspace, row, false);
                 lease.workspace.reach(stage);
@@ -469,9 +477,11 @@ impl Batch {
     /// `index` is not smaller than `num_envs`.
     #[track_caller]
     pub(crate) fn read_data<T>(&self, index: usize, read: impl FnOnce(&Data) -> T) -> T {
-        let version = self.with_row(index, |row| row.version);
+        let version = self.with_row(index, RowPart::Results, Changes::None, |row| row.version);
         self.with_workspace(version, |workspace| {
-            self.with_row(index, |row| Lease::new(workspace, row, false).workspace.reach(Stage::Forward));
+            self.with_row(index, RowPart::Results, Changes::None, |row| {
+                Lease::new(workspace, row, false).workspace.reach(Stage::Forward);
+            });
             workspace.clear_unsaved_results();
             read(workspace.data())
         })
@@ -498,7 +508,7 @@ impl Batch {
     /// `index` is not smaller than `num_envs`.
     #[track_caller]
     pub(crate) fn read_row<T>(&self, index: usize, read: impl FnOnce(StoredRow<'_>) -> T) -> T {
-        self.with_row(index, |row| read(StoredRow { row, model: &self.model }))
+        self.with_row(index, RowPart::Results, Changes::None, |row| read(StoredRow { row, model: &self.model }))
     }
 
     /// Writes to environment `index`, with a forward pass done before.
@@ -516,7 +526,7 @@ impl Batch {
     /// `index` is not smaller than `num_envs`.
     #[track_caller]
     pub(crate) fn write_at<T>(&mut self, index: usize, stage: Stage, write: impl FnOnce(&mut SimEnv) -> T) -> T {
-        self.with_row(index, |row| {
+        self.with_row(index, RowPart::Results, Changes::All, |row| {
             self.with_workspace(row.version, |workspace| {
                 let lease = Lease::new(workspace, row, true);
                 lease.workspace.reach(stage);
@@ -525,21 +535,23 @@ impl Batch {
         })
     }
 
-    /// Changes the drives of environment `index`, or other fields of its row that no `mjData` contains.
+    /// Changes the drives of environment `index`, or other fields of its row that no `mjData` contains: neither the state
+    /// nor results of the last solve, which may be behind those of a device.
     ///
     /// # Panics
     /// `index` is not smaller than `num_envs`.
     #[track_caller]
     pub(crate) fn edit_row<T>(&mut self, index: usize, edit: impl FnOnce(&mut EnvRow, &Model) -> T) -> T {
-        self.with_row(index, |row| edit(row, &self.model))
+        self.with_row(index, RowPart::Clock, Changes::Inputs, |row| edit(row, &self.model))
     }
 
     #[track_caller]
-    fn with_row<T>(&self, index: usize, act: impl FnOnce(&mut Box<EnvRow>) -> T) -> T {
+    fn with_row<T>(&self, index: usize, part: RowPart, changes: Changes, act: impl FnOnce(&mut Box<EnvRow>) -> T) -> T {
         assert!(index < self.num_envs, "environment {index} of {}", self.num_envs);
-        let mut chunk = lock(&self.chunks.chunks[index / self.chunks.chunk_size]);
-        chunk.expect_changes();
-        act(&mut chunk.rows[index % self.chunks.chunk_size])
+        self.catch_up(part);
+        let mut taken = self.chunks.lock_chunk(index / self.chunks.chunk_size);
+        taken.expect_changes(changes);
+        act(&mut taken.chunk.rows[index % self.chunks.chunk_size])
     }
 
     /// Number of times buffers were doubled, in the working memory of all threads. It depends on the number of threads,
@@ -555,9 +567,15 @@ impl Batch {
 }
 
 impl LockedChunk<'_> {
+    /// Notes that rows may change, and that they may get other versions.
+    fn expect_changes(&mut self, changes: Changes) {
+        self.chunk.bodies.expect_changes();
+        self.chunk.changes = self.chunk.changes.max(changes);
+    }
+
     /// Calls `act` for every row of the chunk, with its index in the chunk.
     fn for_each_row(&mut self, mut act: impl FnMut(usize, &mut Box<EnvRow>)) {
-        self.chunk.expect_changes();
+        self.expect_changes(Changes::None);
         self.chunk.rows.iter_mut().enumerate().for_each(|(k, row)| act(k, row));
     }
 
@@ -570,16 +588,11 @@ impl LockedChunk<'_> {
         steps: u32,
         mut act: impl FnMut(usize, &mut SimEnv, &mut Vec<f64>),
     ) {
-        self.chunk.expect_changes();
+        self.expect_changes(Changes::All);
         let Chunk { rows, read_values, .. } = &mut *self.chunk;
         for k in 0..rows.len() {
             // The next rows are fetched while this environment steps: first the row, then the arrays it points to.
-            if let Some(next) = rows.get(k + 1) {
-                next.prefetch();
-            }
-            if let Some(after) = rows.get(k + 2) {
-                kinetoscope_mujoco::prefetch(std::slice::from_ref(&**after));
-            }
+            prefetch_after(rows, k, EnvRow::prefetch);
             let row = &mut rows[k];
             let lease = if steps > 0 { Lease::for_step(workspace, row) } else { Lease::new(workspace, row, true) };
             act(self.first + k, lease.workspace, read_values);
@@ -591,6 +604,12 @@ impl Chunks {
     /// Locks the chunk with index `c`.
     fn lock_chunk(&self, c: usize) -> LockedChunk<'_> {
         LockedChunk { first: c * self.chunk_size, chunk: lock(&self.chunks[c]) }
+    }
+
+    /// The shares, with counters of their own: reads do not wait for other reads.
+    fn fresh_shares(&self) -> Vec<Share> {
+        let fresh = |share: &Share| Share { next: AtomicUsize::new(share.chunks.start), chunks: share.chunks.clone() };
+        self.shares.iter().map(fresh).collect()
     }
 
     /// Processes the share of `thread` among `shares`, then the remaining chunks of the following shares.

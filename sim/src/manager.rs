@@ -18,6 +18,7 @@ use crate::objects::robot::{Robot, RobotCfg, RobotMut};
 use crate::objects::robot_data::{RobotData, RobotKind};
 use crate::objects::terrain::{Terrain, TerrainCfg};
 use crate::observer::{ObserverList, SimEvent};
+use crate::row::RowPart;
 use crate::sensor_list::{SensorId, SensorList};
 use crate::simulation::Simulation;
 use crate::simulation_cfg::SimulationManagerCfg;
@@ -509,7 +510,7 @@ impl SimulationManager {
     /// Simulation time of each environment since its last reset \[s\].
     pub fn time(&self) -> Vec<f64> {
         let mut times = Vec::with_capacity(self.num_envs());
-        self.simulation.batch.for_each_row(|_, row| times.push(row.time()));
+        self.simulation.batch.for_each_row(RowPart::Clock, |_, row| times.push(row.time()));
         times
     }
 
@@ -517,7 +518,7 @@ impl SimulationManager {
     /// last valid state until reset.
     pub fn diverged(&self) -> Vec<DivergedEnv> {
         let mut diverged = Vec::new();
-        self.simulation.batch.for_each_row(|i, env| {
+        self.simulation.batch.for_each_row(RowPart::Clock, |i, env| {
             if let EnvStatus::Diverged { step, reason } = env.status() {
                 diverged.push(DivergedEnv { env: EnvId(i), step: *step, reason: reason.to_string() });
             }
@@ -560,7 +561,7 @@ fn load_on_device(
 ) -> std::result::Result<(), (DeviceError, DeviceMirror)> {
     let table = simulation.batch.read_row(0, |row| Arc::clone(row.drives.table()));
     let loaded =
-        DeviceScene::new(cfg, contents, simulation).and_then(|scene| device.load(&scene, &table, cfg.num_envs));
+        DeviceScene::new(cfg, contents, simulation).and_then(|scene| scene.load_on(&mut device, &table, cfg.num_envs));
     match loaded {
         Ok(()) => {
             simulation.batch.set_device(device);

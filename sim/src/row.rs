@@ -90,13 +90,23 @@ impl EnvRow {
 
     /// Prefetches the arrays that rows never share, without waiting for them.
     pub(crate) fn prefetch(&self) {
-        mj::prefetch(self.motion.values());
-        mj::prefetch(self.solved.values());
-        mj::prefetch(self.joint_inputs.values());
-        self.drives.prefetch();
+        self.prefetch_results();
+        self.prefetch_inputs();
         if let Some(patch) = &self.patch {
             patch.prefetch();
         }
+    }
+
+    /// Prefetches the state and the results of the last solve.
+    pub(crate) fn prefetch_results(&self) {
+        mj::prefetch(self.motion.values());
+        mj::prefetch(self.solved.values());
+    }
+
+    /// Prefetches the inputs and the efforts.
+    pub(crate) fn prefetch_inputs(&self) {
+        mj::prefetch(self.joint_inputs.values());
+        self.drives.prefetch();
     }
 
     /// Sets the differences of the environment's model from the compiled one, outside of working memory. Welds stay.
@@ -200,6 +210,51 @@ impl EnvRow {
     /// Counts of MuJoCo's warnings since the environment was created, without overflows that a repeated step resolved.
     pub fn warnings(&self) -> &WarningCounts {
         &self.cold.warnings
+    }
+}
+
+/// Prefetches what a thread needs after the row with index `k`: arrays of the next row by `arrays`, and the row after it.
+pub(crate) fn prefetch_after(rows: &[Box<EnvRow>], k: usize, arrays: impl FnOnce(&EnvRow)) {
+    if let Some(next) = rows.get(k + 1) {
+        arrays(next);
+    }
+    if let Some(after) = rows.get(k + 2) {
+        mj::prefetch(std::slice::from_ref(&**after));
+    }
+}
+
+/// Part of a row that a reader needs. Each part contains the ones before it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum RowPart {
+    /// Inputs, properties and captured quantities, which no device changes.
+    Inputs,
+    /// Steps, time and divergence.
+    Clock,
+    /// Positions, velocities, activations, and accelerations as the start of the next solve.
+    State,
+    /// Results of the last solve: accelerations, forces and efforts.
+    Results,
+}
+
+/// Array of the state.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum StateArray {
+    /// Positions, with quaternions as they were before a forward pass.
+    Positions,
+    /// Velocities.
+    Velocities,
+    /// Accelerations of the last step, from which the next solve starts.
+    Accelerations,
+}
+
+impl StateArray {
+    /// The array in a row.
+    pub(crate) fn of<'a>(self, row: &'a StoredRow<'_>) -> &'a [f64] {
+        match self {
+            Self::Positions => row.raw_qpos(),
+            Self::Velocities => row.qvel(),
+            Self::Accelerations => row.qacc_warmstart(),
+        }
     }
 }
 

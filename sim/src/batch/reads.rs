@@ -4,12 +4,11 @@
 //! Unlike steps, these reads do not wait for working memory: a closure that reads one environment may call them.
 
 use super::bodies::StoredBodies;
-use super::{Batch, Chunk, Lease, LockedChunk, Share, lock};
+use super::{Batch, Chunk, Lease, LockedChunk, lock};
 use crate::env::{SimEnv, Stage};
-use crate::row::StoredRow;
+use crate::row::{RowPart, StateArray, StoredRow};
 use ndarray::{Array2, Array3};
 use std::sync::Mutex;
-use std::sync::atomic::AtomicUsize;
 
 /// Largest number of chosen environments that the calling thread reads alone.
 const FEW_ENVS: usize = 8;
@@ -29,7 +28,7 @@ impl Batch {
         }
         let mut mask = vec![false; self.num_envs];
         chosen.iter().for_each(|&index| mask[index] = true);
-        self.in_chunks(&mut vec![(); self.num_envs], |workspace, taken, _| {
+        self.in_chunks(RowPart::Results, &mut vec![(); self.num_envs], |workspace, taken, _| {
             let first = taken.first;
             taken.for_each_row(|k, row| {
                 if mask[first + k] {
@@ -50,7 +49,7 @@ impl Batch {
         read: impl Fn(usize, &SimEnv, &mut [T]) + Sync,
     ) {
         let width = out.len() / self.num_envs;
-        self.in_chunks(out, |workspace, taken, out| {
+        self.in_chunks(RowPart::Results, out, |workspace, taken, out| {
             let first = taken.first;
             taken.for_each_row(|k, row| {
                 let lease = Lease::new(workspace, row, false);
@@ -71,6 +70,7 @@ impl Batch {
                 read(first + k, &bodies, &mut out[k * width..(k + 1) * width]);
             }
         };
+        self.catch_up(RowPart::Results);
         let chunk_size = self.chunks.chunk_size;
         if out.len() <= FEW_ELEMENTS && self.chunks.chunks.iter().all(|chunk| lock(chunk).bodies.is_current()) {
             for (c, (chunk, out)) in self.chunks.chunks.iter().zip(self.parts(out)).enumerate() {
@@ -78,16 +78,22 @@ impl Batch {
             }
             return;
         }
-        self.in_chunks(out, |workspace, taken, out| {
+        self.in_chunks(RowPart::Results, out, |workspace, taken, out| {
             let Chunk { rows, bodies, .. } = &mut *taken.chunk;
             bodies.update(workspace, rows, model);
             copy(taken.first, &taken.chunk, out);
         });
     }
 
-    /// Calls `read` for every environment, in parallel and in any order, with its row and with the elements of `out`
-    /// that belong to the environment: an equal number for each.
-    pub(crate) fn read_stored<T: Send>(&self, out: &mut [T], read: impl Fn(&StoredRow<'_>, &mut [T]) + Sync) {
+    /// Calls `read` for every environment, in parallel and in any order, with its row, which is up to date as far as
+    /// `part`, and with the elements of `out` that belong to the environment: an equal number for each. `read` must not
+    /// read the batch.
+    pub(crate) fn read_stored<T: Send>(
+        &self,
+        part: RowPart,
+        out: &mut [T],
+        read: impl Fn(&StoredRow<'_>, &mut [T]) + Sync,
+    ) {
         let (width, model) = (out.len() / self.num_envs, &self.model);
         let copy = |chunk: &Chunk, out: &mut [T]| {
             for (k, row) in chunk.rows.iter().enumerate() {
@@ -95,12 +101,13 @@ impl Batch {
             }
         };
         if out.len() <= FEW_ELEMENTS {
+            self.catch_up(part);
             for (chunk, out) in self.chunks.chunks.iter().zip(self.parts(out)) {
                 copy(&lock(chunk), out);
             }
             return;
         }
-        self.in_chunks(out, |_, taken, out| copy(&taken.chunk, out));
+        self.in_chunks(part, out, |_, taken, out| copy(&taken.chunk, out));
     }
 
     /// Parts of `out` that belong to the chunks.
@@ -119,8 +126,14 @@ impl Batch {
     }
 
     /// Runs `job` once for every chunk, in parallel, with working memory and the part of `out` that belongs to the
-    /// chunk.
-    fn in_chunks<T: Send>(&self, out: &mut [T], job: impl Fn(&mut SimEnv, &mut LockedChunk, &mut [T]) + Sync) {
+    /// chunk. Rows are up to date as far as `part`.
+    pub(super) fn in_chunks<T: Send>(
+        &self,
+        part: RowPart,
+        out: &mut [T],
+        job: impl Fn(&mut SimEnv, &mut LockedChunk, &mut [T]) + Sync,
+    ) {
+        self.catch_up(part);
         let parts: Vec<Mutex<&mut [T]>> = self.parts(out).into_iter().map(Mutex::new).collect();
         let chunks = &self.chunks;
         if self.num_envs <= self.threads() {
@@ -133,9 +146,7 @@ impl Batch {
             }
             return;
         }
-        // Counters of this call alone: reads do not wait for other reads.
-        let fresh = |share: &Share| Share { next: AtomicUsize::new(share.chunks.start), chunks: share.chunks.clone() };
-        let shares: Vec<Share> = chunks.shares.iter().map(fresh).collect();
+        let shares = chunks.fresh_shares();
         self.pool.run(shares.len(), |slot| {
             self.with_workspace(SimEnv::first_version(slot + 1), |workspace| {
                 chunks.process_shares(&shares, slot, |taken| {
@@ -191,8 +202,9 @@ impl Batch {
         values
     }
 
-    /// Reads the rows of all environments in order, on the calling thread.
-    pub(crate) fn for_each_row(&self, mut read: impl FnMut(usize, StoredRow<'_>)) {
+    /// Reads the rows of all environments in order, on the calling thread. They are up to date as far as `part`.
+    pub(crate) fn for_each_row(&self, part: RowPart, mut read: impl FnMut(usize, StoredRow<'_>)) {
+        self.catch_up(part);
         for (c, chunk) in self.chunks.chunks.iter().enumerate() {
             for (i, row) in lock(chunk).rows.iter().enumerate() {
                 read(c * self.chunks.chunk_size + i, StoredRow { row, model: &self.model });
@@ -200,17 +212,37 @@ impl Batch {
         }
     }
 
-    /// Reads a value of the row of each environment and each of `items`, shape (N, items).
-    pub(crate) fn gather_stored<I, T>(&self, items: &[I], read: impl Fn(&StoredRow<'_>, &I) -> T) -> Array2<T>
+    /// Reads a number of the state of each environment for each of `items`, shape (N, items), in parallel. `place` returns
+    /// the index in `array`.
+    pub(crate) fn gather_state<I: Sync>(
+        &self,
+        array: StateArray,
+        items: &[I],
+        place: impl Fn(&I) -> usize + Sync,
+    ) -> Array2<f64> {
+        let on_device = self.gather_on_device(array, items, &place);
+        on_device.unwrap_or_else(|| self.gather_stored(RowPart::State, items, |row, item| array.of(row)[place(item)]))
+    }
+
+    /// Reads a value of the row of each environment and each of `items`, shape (N, items), in parallel. Rows are up to
+    /// date as far as `part`.
+    pub(crate) fn gather_stored<I: Sync, T>(
+        &self,
+        part: RowPart,
+        items: &[I],
+        read: impl Fn(&StoredRow<'_>, &I) -> T + Sync,
+    ) -> Array2<T>
     where
-        T: Copy + Default,
+        T: Copy + Default + Send,
     {
         let mut values = Array2::default((self.num_envs, items.len()));
-        self.for_each_row(|env_id, row| {
-            for (value, item) in values.row_mut(env_id).iter_mut().zip(items) {
-                *value = read(&row, item);
-            }
-        });
+        if let Some(out) = values.as_slice_mut() {
+            self.read_stored(part, out, |row, out| {
+                for (value, item) in out.iter_mut().zip(items) {
+                    *value = read(row, item);
+                }
+            });
+        }
         values
     }
 }

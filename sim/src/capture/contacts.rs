@@ -54,7 +54,11 @@ pub(super) fn capture(owners: &[Option<u32>], data: &Data, contacts: &mut Vec<Co
 }
 
 /// Replaces `contacts` by `solved`, as [`capture`] does.
-pub(super) fn of_solved(owners: &[Option<u32>], solved: &[SolvedContact], contacts: &mut Vec<Contact>) {
+pub(super) fn of_solved(
+    owners: &[Option<u32>],
+    solved: impl Iterator<Item = SolvedContact>,
+    contacts: &mut Vec<Contact>,
+) {
     contacts.clear();
-    contacts.extend(solved.iter().filter_map(|contact| contact.between(owners)));
+    contacts.extend(solved.filter_map(|contact| contact.between(owners)));
 }

@@ -120,7 +120,7 @@ impl CaptureRequest {
     }
 
     /// Captures solved contacts.
-    pub(crate) fn capture_contacts(&self, contacts: &[SolvedContact], solved: &mut CapturedStep) {
+    pub(crate) fn capture_contacts(&self, contacts: impl Iterator<Item = SolvedContact>, solved: &mut CapturedStep) {
         contacts::of_solved(&self.body_axis.geom_owners, contacts, &mut solved.contacts);
     }
 

@@ -1,194 +1,71 @@
 //! The rows of all environments and their copies on a device.
+//!
+//! A step reads nothing back: the rows are then behind the device, and [`DeviceMirror::receive`] brings them up to date
+//! as far as a reader needs. Rows are visited on the threads of the batch, each by one thread, so that results do not
+//! depend on the number of threads. Calls of the device are made on the calling thread alone.
 
-use super::captured::{CONTACT_NUMBERS, DeviceBodies, contacts_by_env};
-use super::{DeviceError, DevicePhysics, DeviceScene, StepReport};
+use super::captured::{DeviceBodies, DeviceContacts};
+use super::inputs::{Changes, Layout, STATE, SentRows, Write};
+use super::model_writes::{ModelWrites, add_model_writes};
+use super::{DeviceError, DevicePhysics, StepReport};
 use crate::capture::CaptureRequest;
-use crate::drive::actuator;
-use crate::drive::table::{DriveTable, Realization};
+use crate::drive::table::DriveTable;
 use crate::env::{Divergence, EnvStatus};
-use crate::row::{EnvRow, StoredRow};
-use kinetoscope_mujoco::{EngineError, Model, ModelPatch, NumberArray, Warning};
+use crate::row::{EnvRow, RowPart, StateArray, StoredRow, prefetch_after};
+use kinetoscope_mujoco::{EngineError, Model, Warning};
 use kinetoscope_scene::StateFields;
-use std::collections::BTreeMap;
+use std::path::Path;
 use std::sync::Arc;
 
-/// Largest effort in single precision, for drives without a limit: products with it stay finite.
-const UNLIMITED: f64 = 1e9;
-
-/// Arrays of the model that can differ between the environments of a device.
-const MODEL_ARRAYS: [NumberArray; 15] = [
-    NumberArray::BODY_MASS,
-    NumberArray::BODY_SUBTREEMASS,
-    NumberArray::BODY_INERTIA,
-    NumberArray::BODY_IPOS,
-    NumberArray::BODY_IQUAT,
-    NumberArray::BODY_POS,
-    NumberArray::BODY_QUAT,
-    NumberArray::BODY_INVWEIGHT0,
-    NumberArray::DOF_ARMATURE,
-    NumberArray::DOF_DAMPING,
-    NumberArray::DOF_FRICTIONLOSS,
-    NumberArray::DOF_INVWEIGHT0,
-    NumberArray::TENDON_FRICTIONLOSS,
-    NumberArray::TENDON_INVWEIGHT0,
-    NumberArray::GEOM_FRICTION,
-];
-
-/// Arrays that change together with properties and that the physics of the device does not read.
-const UNREAD_ARRAYS: [&str; 8] = [
-    "actuator_acc0",
-    "actuator_length0",
-    "cam_pos0",
-    "cam_poscom0",
-    "dof_M0",
-    "geom_rgba",
-    "light_pos0",
-    "light_poscom0",
-];
-
-/// Input of the device with a row per environment.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Input {
-    Positions,
-    Velocities,
-    Activations,
-    WarmStart,
-    Controls,
-    JointForces,
-    BodyForces,
-    MocapPositions,
-    MocapOrientations,
-    Stiffness,
-    Damping,
-    MaxEffort,
-    TargetPosition,
-    TargetVelocity,
-    Feedforward,
-    ViscousDamping,
-}
-
-impl Input {
-    const ALL: [Self; 16] = [
-        Self::Positions,
-        Self::Velocities,
-        Self::Activations,
-        Self::WarmStart,
-        Self::Controls,
-        Self::JointForces,
-        Self::BodyForces,
-        Self::MocapPositions,
-        Self::MocapOrientations,
-        Self::Stiffness,
-        Self::Damping,
-        Self::MaxEffort,
-        Self::TargetPosition,
-        Self::TargetVelocity,
-        Self::Feedforward,
-        Self::ViscousDamping,
-    ];
-
-    /// Name of the array on the device.
-    fn name(self) -> &'static str {
-        match self {
-            Self::Positions => "qpos",
-            Self::Velocities => "qvel",
-            Self::Activations => "act",
-            Self::WarmStart => "qacc_warmstart",
-            Self::Controls => "ctrl",
-            Self::JointForces => "qfrc_applied",
-            Self::BodyForces => "xfrc_applied",
-            Self::MocapPositions => "mocap_pos",
-            Self::MocapOrientations => "mocap_quat",
-            Self::Stiffness => "stiffness",
-            Self::Damping => "damping",
-            Self::MaxEffort => "max_effort",
-            Self::TargetPosition => "target_position",
-            Self::TargetVelocity => "target_velocity",
-            Self::Feedforward => "feedforward",
-            Self::ViscousDamping => "viscous_damping",
-        }
-    }
-
-    /// True for the state, which steps of the device change.
-    fn is_state(self) -> bool {
-        matches!(self, Self::Positions | Self::Velocities | Self::Activations | Self::WarmStart)
-    }
-
-    /// Appends the values in a row of the batch to `out`.
-    fn append(self, row: &StoredRow<'_>, rows: &[usize], out: &mut Vec<f32>) {
-        let (drives, model) = (&row.row.drives, row.model);
-        let mut put = |values: &[f64]| out.extend(values.iter().map(|x| *x as f32));
-        match self {
-            Self::Positions => put(row.raw_qpos()),
-            Self::Velocities => put(row.qvel()),
-            Self::Activations => put(row.row.motion.act(model)),
-            Self::WarmStart => put(row.qacc_warmstart()),
-            Self::JointForces => put(&drives.applied),
-            Self::BodyForces => put(row.row.body_inputs.xfrc_applied(model)),
-            Self::MocapPositions => put(row.row.body_inputs.mocap(model).0),
-            Self::MocapOrientations => put(row.row.body_inputs.mocap(model).1),
-            Self::Controls => {
-                let first = out.len();
-                out.extend(row.ctrl().iter().map(|x| *x as f32));
-                for (i, drive) in drives.table().drives.iter().enumerate() {
-                    let target = drives.target(i);
-                    out[first + drive.ctrl] = match drive.realization {
-                        Realization::Actuator => actuator::control(&drives.gains[i], &target),
-                        Realization::ConstraintRow | Realization::Explicit { .. } => target.position,
-                    } as f32;
-                }
-            }
-            Self::Stiffness => out.extend(rows.iter().map(|&i| drives.gains[i].kp as f32)),
-            Self::Damping => out.extend(rows.iter().map(|&i| drives.gains[i].kd as f32)),
-            Self::MaxEffort => out.extend(rows.iter().map(|&i| drives.gains[i].max_effort.min(UNLIMITED) as f32)),
-            Self::TargetPosition => out.extend(rows.iter().map(|&i| drives.position[i] as f32)),
-            Self::TargetVelocity => out.extend(rows.iter().map(|&i| drives.velocity[i] as f32)),
-            Self::Feedforward => out.extend(rows.iter().map(|&i| drives.feedforward[i] as f32)),
-            Self::ViscousDamping => put(drives.damping()),
-        }
-    }
-}
-
-/// An input, with the values that the device has.
-#[derive(Debug)]
-struct Sent {
-    input: Input,
-    width: usize,
-    /// Values on the device, environment by environment; NaN before the first write.
-    values: Vec<f32>,
-    /// Environments whose values changed, and the new values.
-    changed: (Vec<i32>, Vec<f32>),
+/// Rows of a chunk of environments of a batch.
+pub(crate) struct ChunkRows<'a> {
+    /// Index of the first environment.
+    pub(crate) first: usize,
+    pub(crate) rows: &'a mut [Box<EnvRow>],
+    pub(crate) changes: &'a mut Changes,
+    pub(crate) sent: &'a mut SentRows,
 }
 
 /// Rows of the environments of a batch.
 pub(crate) trait EnvRows {
-    /// Calls `visit` for all environments in order.
-    fn for_each(&self, visit: &mut dyn FnMut(usize, &mut EnvRow));
+    /// Calls `visit` once for every chunk, on the threads of the batch and in any order.
+    fn visit(&self, visit: &(dyn Fn(ChunkRows<'_>) + Sync));
 
-    /// Calls `visit` in order for environments that may have changed since [`set_unchanged`](Self::set_unchanged).
-    fn for_each_changed(&self, visit: &mut dyn FnMut(usize, &mut EnvRow));
-
-    /// Notes that the device has all rows.
-    fn set_unchanged(&self);
+    /// Calls `visit` for every chunk that may have changed, in order, on the calling thread.
+    fn visit_changed(&self, visit: &mut dyn FnMut(ChunkRows<'_>));
 }
-
-/// Writes of arrays of the model: environments and their rows, by the name of the array.
-type ModelWrites = BTreeMap<&'static str, (Vec<i32>, Vec<f32>)>;
 
 /// The environments of a batch on a device.
 #[derive(Debug)]
 pub(crate) struct DeviceMirror {
     physics: Box<dyn DevicePhysics>,
-    sent: Vec<Sent>,
-    /// Differences of the models of environments that the device has.
-    patches: Vec<Option<Arc<ModelPatch>>>,
-    /// Drives with a constraint row.
-    row_drives: Vec<usize>,
     table: Arc<DriveTable>,
+    num_envs: usize,
+    /// Inputs of the scene; `None` before its first step.
+    layout: Option<Layout>,
+    /// What is sent in a step, for each input of the layout.
+    writes: Vec<Write>,
+    /// Arrays of [`STATE`] as last read.
+    states: [Vec<f32>; 4],
+    /// True for each of `states` that was read after the last step.
+    are_states_read: [bool; 4],
+    /// Largest part that is up to date in all rows.
+    current: RowPart,
+    /// Steps since clocks were last up to date.
+    unread_steps: u64,
     /// Error after which the device does not step again.
     failed: Option<DeviceError>,
     /// Number of times buffers of the device grew.
     growths: u64,
+}
+
+/// Arrays of the device that [`DeviceMirror::receive`] writes to rows.
+#[derive(Default)]
+struct Results {
+    /// `qacc`, `qfrc_actuator` and `qfrc_constraint`.
+    solved: [Vec<f32>; 3],
+    forces: Vec<f32>,
+    efforts: Vec<f32>,
 }
 
 impl DeviceMirror {
@@ -196,43 +73,31 @@ impl DeviceMirror {
     pub(crate) fn new(physics: Box<dyn DevicePhysics>) -> Self {
         Self {
             physics,
-            sent: Vec::new(),
-            patches: Vec::new(),
-            row_drives: Vec::new(),
             table: Arc::default(),
+            num_envs: 0,
+            layout: None,
+            writes: Vec::new(),
+            states: Default::default(),
+            are_states_read: [false; 4],
+            current: RowPart::Results,
+            unread_steps: 0,
             failed: None,
             growths: 0,
         }
     }
 
-    /// Loads a scene, unless nothing moves in it. All rows are sent before the next step.
-    ///
-    /// # Errors
-    /// The device cannot simulate the scene, failed, or the files of the scene cannot be written to a temporary folder.
-    pub(crate) fn load(
-        &mut self,
-        scene: &DeviceScene<'_>,
-        table: &Arc<DriveTable>,
-        num_envs: usize,
-    ) -> Result<(), DeviceError> {
-        let failed = |error: std::io::Error| DeviceError::Failed(format!("the scene cannot be written: {error}"));
-        if scene.moves() {
-            let folder = tempfile::tempdir().map_err(failed)?;
-            scene.write_to(folder.path()).map_err(failed)?;
-            self.physics.load(folder.path(), scene.json(), num_envs)?;
-        }
-        self.reset_for(table, num_envs);
-        Ok(())
+    /// Loads a scene from its files, as [`DevicePhysics::load`] does.
+    pub(super) fn load(&mut self, folder: &Path, scene: &str, num_envs: usize) -> Result<(), DeviceError> {
+        self.physics.load(folder, scene, num_envs)
     }
 
     /// Forgets what the device has, which is a new scene with the drives of `table`.
     pub(super) fn reset_for(&mut self, table: &Arc<DriveTable>, num_envs: usize) {
-        self.sent.clear();
-        self.patches = vec![None; num_envs];
         self.table = Arc::clone(table);
-        let drives = table.drives.iter().enumerate();
-        let rows = drives.filter(|(_, drive)| drive.realization == Realization::ConstraintRow);
-        self.row_drives = rows.map(|(index, _)| index).collect();
+        self.num_envs = num_envs;
+        self.layout = None;
+        self.states = Default::default();
+        (self.current, self.unread_steps) = (RowPart::Results, 0);
         self.failed = None;
     }
 
@@ -251,23 +116,40 @@ impl DeviceMirror {
         self.growths
     }
 
-    /// Steps all environments and writes their new states to the rows in `rows`. After an error, all
-    /// environments count as diverged.
+    /// Largest part that is up to date in all rows.
+    pub(crate) fn current(&self) -> RowPart {
+        self.current
+    }
+
+    /// Steps all environments. The rows are then behind the device. After an error, all environments count as diverged,
+    /// in the state that their rows have.
     pub(crate) fn step(&mut self, model: &Model, count: u32, capture: Option<&CaptureRequest>, rows: &dyn EnvRows) {
         let done = match &self.failed {
             Some(error) => Err(error.clone()),
             None => self.try_step(model, count, capture, rows),
         };
-        if let Err(error) = done {
-            tracing::error!(target: "kinetoscope_sim", %error, "the physics of the device failed");
-            rows.for_each(&mut |_, row| {
-                if row.diverged.is_none() {
-                    let reason = Divergence::Engine(EngineError { message: error.to_string() });
-                    row.diverged = Some(Box::new(EnvStatus::Diverged { step: row.steps, reason }));
-                }
-            });
-            self.failed = Some(error);
-        }
+        self.end(done, rows);
+    }
+
+    /// Brings all rows up to date as far as `part`. If the device fails, all environments count as diverged.
+    pub(crate) fn receive(&mut self, model: &Model, part: RowPart, rows: &dyn EnvRows) {
+        let done = self.try_receive(model, part, &[], rows);
+        self.end(done, rows);
+    }
+
+    /// Freezes all environments after an error.
+    fn end(&mut self, done: Result<(), DeviceError>, rows: &dyn EnvRows) {
+        let Err(error) = done else { return };
+        tracing::error!(target: "kinetoscope_sim", %error, "the physics of the device failed");
+        rows.visit(&|chunk| {
+            for row in chunk.rows.iter_mut().filter(|row| row.diverged.is_none()) {
+                let reason = Divergence::Engine(EngineError { message: error.to_string() });
+                row.diverged = Some(Box::new(EnvStatus::Diverged { step: row.steps, reason }));
+            }
+        });
+        self.failed = Some(error);
+        // The device is not read again.
+        (self.current, self.unread_steps) = (RowPart::Results, 0);
     }
 
     fn try_step(
@@ -294,78 +176,73 @@ impl DeviceMirror {
             self.growths += 1;
             tracing::info!(target: "kinetoscope_sim", rows, contacts, "buffers of the device grew");
         }
-        self.receive(model, count, &report, rows)?;
-        if let Some(capture) = capture {
-            self.receive_capture(model, capture, rows)?;
+        self.current = RowPart::Inputs;
+        self.are_states_read = [false; 4];
+        self.unread_steps += u64::from(count);
+        if !report.diverged.is_empty() {
+            let ended: Vec<(usize, u64, &str)> = report
+                .diverged
+                .iter()
+                .map(|(env, step, reason)| (*env, self.unread_steps - u64::from(count) + step, reason.as_str()))
+                .collect();
+            self.try_receive(model, RowPart::Results, &ended, rows)?;
         }
-        rows.set_unchanged();
-        Ok(())
+        match capture {
+            Some(capture) => self.receive_capture(model, capture, rows),
+            None => Ok(()),
+        }
     }
 
     /// Sends everything that changed in the rows.
     fn send(&mut self, model: &Model, rows: &dyn EnvRows) -> Result<(), DeviceError> {
-        let num_envs = self.patches.len();
-        let (row_drives, patches) = (&self.row_drives, &mut self.patches);
-        let sent = &mut self.sent;
-        let mut writes = ModelWrites::new();
-        let (mut scratch, mut unsupported) = (Vec::new(), None);
-        rows.for_each_changed(&mut |env, row| {
-            let row = StoredRow { row, model };
-            if sent.is_empty() {
-                for input in Input::ALL {
-                    scratch.clear();
-                    input.append(&row, row_drives, &mut scratch);
-                    let width = scratch.len();
-                    let values = vec![f32::NAN; width * num_envs];
-                    sent.push(Sent { input, width, values, changed: Default::default() });
-                }
-                sent.retain(|array| array.width > 0);
+        let table = &self.table;
+        let layout = &*self.layout.get_or_insert_with(|| Layout::new(model, table));
+        self.writes.resize_with(layout.inputs().len(), Write::default);
+        let mut changed = false;
+        rows.visit_changed(&mut |_| changed = true);
+        if !changed {
+            return Ok(());
+        }
+        let states = &self.states;
+        rows.visit(&|chunk| {
+            if *chunk.changes != Changes::None {
+                chunk.sent.compare(layout, model, chunk.rows, chunk.first, *chunk.changes, states);
             }
-            if row.row.diverged.is_some() {
-                return;
-            }
-            for array in sent.iter_mut() {
-                scratch.clear();
-                array.input.append(&row, row_drives, &mut scratch);
-                let mine = &mut array.values[env * array.width..(env + 1) * array.width];
-                if mine.iter().map(|x| x.to_bits()).ne(scratch.iter().map(|x| x.to_bits())) {
-                    mine.copy_from_slice(&scratch);
-                    array.changed.0.push(env as i32);
-                    array.changed.1.extend_from_slice(&scratch);
+        });
+        let writes = &mut self.writes;
+        writes.iter_mut().for_each(Write::clear);
+        let mut of_models = ModelWrites::new();
+        let mut unsupported = None;
+        rows.visit_changed(&mut |chunk| {
+            for k in chunk.sent.changed_models() {
+                let row = StoredRow { row: &chunk.rows[k], model };
+                let before = chunk.sent.replace_patch(k, row.row.patch.as_ref());
+                if let Err(error) = add_model_writes(chunk.first + k, &row, before.as_deref(), &mut of_models) {
+                    unsupported.get_or_insert(error);
                 }
             }
-            let same = |one: &Option<Arc<ModelPatch>>, other: &Option<Arc<ModelPatch>>| match (one, other) {
-                (None, None) => true,
-                (Some(one), Some(other)) => Arc::ptr_eq(one, other),
-                _ => false,
-            };
-            if !same(&patches[env], &row.row.patch) {
-                let before = std::mem::replace(&mut patches[env], row.row.patch.clone());
-                if let Err(error) = add_model_writes(env, &row, before.as_deref(), &mut writes) {
-                    unsupported = Some(error);
-                }
-            }
+            chunk.sent.take_writes(layout, chunk.first, writes);
+            *chunk.changes = Changes::None;
         });
         if let Some(error) = unsupported {
             return Err(error);
         }
-        for (name, (envs, values)) in &writes {
+        for (name, (envs, values)) in &of_models {
             self.physics.write(name, envs, values)?;
         }
-        for array in &mut self.sent {
-            if !array.changed.0.is_empty() {
-                self.physics.write(array.input.name(), &array.changed.0, &array.changed.1)?;
-                array.changed.0.clear();
-                array.changed.1.clear();
-            }
+        for (input, write) in layout.inputs().zip(&self.writes).filter(|(_, write)| !write.envs.is_empty()) {
+            self.physics.write(input.name(), &write.envs, &write.values)?;
         }
         Ok(())
     }
 
-    /// Reads an array with a row per environment.
+    /// Reads an array with `width` numbers per environment.
     fn read(&mut self, name: &str, width: usize) -> Result<Vec<f32>, DeviceError> {
+        if width == 0 {
+            return Ok(Vec::new());
+        }
         let values = self.physics.read(name)?;
-        let expected = width * self.patches.len();
+        let expected = width * self.num_envs;
         if values.len() == expected {
             Ok(values)
         } else {
@@ -373,88 +250,99 @@ impl DeviceMirror {
         }
     }
 
-    /// Writes the states after a step to the rows.
-    fn receive(
+    /// Reads the array of [`STATE`] with index `k`, unless it was read after the last step.
+    fn update_state(&mut self, model: &Model, k: usize) -> Result<(), DeviceError> {
+        if !self.are_states_read[k] {
+            let widths = [model.nq(), model.nv(), model.na(), model.nv()];
+            self.states[k] = self.read(STATE[k].name(), widths[k])?;
+            self.are_states_read[k] = true;
+        }
+        Ok(())
+    }
+
+    /// Array of the state after the last step, with a row per environment.
+    ///
+    /// # Errors
+    /// The device failed. The next call of [`receive`](Self::receive) freezes the environments.
+    pub(crate) fn read_state(&mut self, model: &Model, array: StateArray) -> Result<&[f32], DeviceError> {
+        let k = match array {
+            StateArray::Positions => 0,
+            StateArray::Velocities => 1,
+            StateArray::Accelerations => 3,
+        };
+        self.update_state(model, k)?;
+        Ok(&self.states[k])
+    }
+
+    /// Brings all rows up to date as far as `part`. `ended` lists environments that diverged: environment, steps that it
+    /// did since clocks were up to date, and reason.
+    fn try_receive(
         &mut self,
         model: &Model,
-        count: u32,
-        report: &StepReport,
+        part: RowPart,
+        ended: &[(usize, u64, &str)],
         rows: &dyn EnvRows,
     ) -> Result<(), DeviceError> {
-        let (nv, na) = (model.nv(), model.na());
-        for k in 0..self.sent.len() {
-            let (input, width) = (self.sent[k].input, self.sent[k].width);
-            if input.is_state() {
-                self.sent[k].values = self.read(input.name(), width)?;
+        if part <= self.current {
+            return Ok(());
+        }
+        let (nv, nu) = (model.nv(), model.nu());
+        let is_missing = |wanted| self.current < wanted && wanted <= part;
+        let [clock, state, results] = [RowPart::Clock, RowPart::State, RowPart::Results].map(is_missing);
+        if state {
+            (0..STATE.len()).try_for_each(|k| self.update_state(model, k))?;
+        }
+        let row_drives = self.layout.as_ref().map_or(0, |layout| layout.row_drives().len());
+        let mut read = Results::default();
+        if results {
+            for (array, name) in read.solved.iter_mut().zip(["qacc", "qfrc_actuator", "qfrc_constraint"]) {
+                *array = self.read(name, nv)?;
+            }
+            read.forces = self.read("actuator_force", nu)?;
+            read.efforts = self.read("effort", row_drives)?;
+        }
+        let mut ends = vec![None; if ended.is_empty() { 0 } else { self.num_envs }];
+        for (env, steps, reason) in ended {
+            if let Some(end) = ends.get_mut(*env) {
+                *end = Some((*steps, *reason));
             }
         }
-        let solved = ["qacc", "qfrc_actuator", "qfrc_constraint"].map(|name| self.read(name, nv));
-        let [qacc, actuator, constraint] = solved;
-        let solved = [qacc?, actuator?, constraint?];
-        let forces = if model.nu() > 0 { self.physics.read("actuator_force")? } else { Vec::new() };
-        let efforts = match self.row_drives.len() {
-            0 => Vec::new(),
-            width => self.read("effort", width)?,
-        };
-        let num_envs = self.patches.len();
-        let actuators = forces.len() / num_envs;
-        if forces.len() % num_envs > 0 || table_width(&self.table) > actuators {
-            return Err(DeviceError::Failed(format!("actuator_force has {} numbers", forces.len())));
-        }
-        let mut ended = vec![None; num_envs];
-        for (env, step, reason) in &report.diverged {
-            if let Some(ended) = ended.get_mut(*env) {
-                *ended = Some((*step, reason));
-            }
-        }
-        let (sent, table, row_drives) = (&mut self.sent, &self.table, &self.row_drives);
-        let mut effort = Vec::new();
-        rows.for_each(&mut |env, row| {
-            if row.diverged.is_some() {
-                // The device steps on. The row is sent again once the environment runs.
-                forget(sent, env);
-                return;
-            }
-            let done = ended[env].map_or(u64::from(count), |(step, _)| step);
-            let [time, qpos, qvel, act, warm_start] = row.motion.parts_mut(model);
-            for _ in 0..done {
-                time[0] += model.timestep();
-            }
-            for array in sent.iter().filter(|array| array.input.is_state()) {
-                let to = match array.input {
-                    Input::Positions => &mut *qpos,
-                    Input::Velocities => &mut *qvel,
-                    Input::Activations => &mut *act,
-                    _ => &mut *warm_start,
-                };
-                copy(&array.values, env, to);
-            }
-            debug_assert_eq!(act.len(), na);
-            let [to_qacc, to_actuator, to_constraint, to_forces] = row.solved.parts_mut(model);
-            for (from, to) in solved.iter().zip([to_qacc, to_actuator, to_constraint]) {
-                copy(from, env, to);
-            }
-            if to_forces.len() == actuators {
-                copy(&forces, env, to_forces);
-            }
-            effort.clear();
-            effort.extend(table.drives.iter().map(|drive| f64::from(forces[env * actuators + drive.ctrl])));
-            for (k, &drive) in row_drives.iter().enumerate() {
-                effort[drive] = f64::from(efforts[env * row_drives.len() + k]);
-            }
-            row.drives.finish_step(&effort);
-            row.steps = row.steps.saturating_add(done);
-            row.solved_current = false;
-            row.is_forward_counted = false;
-            row.is_pass_impossible = false;
-            // No `mjData` holds this row any longer.
-            row.version = 0;
-            row.cold.captured.clear();
-            if let Some((_, reason)) = ended[env] {
-                row.diverged = Some(Box::new(EnvStatus::Diverged { step: row.steps, reason: divergence(reason) }));
-                forget(sent, env);
+        let (unread, states, table) = (self.unread_steps, &self.states, &*self.table);
+        let row_drives = self.layout.as_ref().map_or(&[][..], Layout::row_drives);
+        rows.visit(&|chunk| {
+            let mut effort = Vec::with_capacity(table.drives.len());
+            for k in 0..chunk.rows.len() {
+                prefetch_after(chunk.rows, k, EnvRow::prefetch_results);
+                let (env, row) = (chunk.first + k, &mut *chunk.rows[k]);
+                // The device steps on without a diverged environment. The row is sent again once the environment runs.
+                if row.diverged.is_some() {
+                    continue;
+                }
+                let end = ends.get(env).copied().flatten();
+                let [time, motion @ ..] = row.motion.parts_mut(model);
+                if state {
+                    for (to, from) in motion.into_iter().zip(states) {
+                        copy(from, env, to);
+                    }
+                }
+                if clock {
+                    let done = end.map_or(unread, |(steps, _)| steps);
+                    for _ in 0..done {
+                        time[0] += model.timestep();
+                    }
+                    note_steps(row, done);
+                }
+                if results {
+                    read.write_to(row, env, model, table, row_drives, &mut effort);
+                }
+                if let Some((_, reason)) = end {
+                    row.diverged = Some(Box::new(EnvStatus::Diverged { step: row.steps, reason: divergence(reason) }));
+                    chunk.sent.forget_state(k);
+                }
             }
         });
+        self.current = part;
+        self.unread_steps = 0;
         Ok(())
     }
 
@@ -465,12 +353,12 @@ impl DeviceMirror {
         capture: &CaptureRequest,
         rows: &dyn EnvRows,
     ) -> Result<(), DeviceError> {
+        // Clocks of rows that are behind would clear the capture later.
+        self.try_receive(model, RowPart::Clock, &[], rows)?;
         let nbody = model.nbody();
-        let contacts = if capture.fields.contains(StateFields::CONTACTS) {
-            let numbers = self.physics.read("contacts")?;
-            contacts_by_env(numbers.as_chunks::<CONTACT_NUMBERS>().0, self.patches.len())
-        } else {
-            Vec::new()
+        let contacts = match capture.fields.contains(StateFields::CONTACTS) {
+            true => Some(DeviceContacts::new(self.physics.read("contacts")?, self.num_envs)),
+            false => None,
         };
         let motion = !capture.fields.intersection(StateFields::ACCELERATIONS | StateFields::JOINT_WRENCHES).is_empty();
         let names = [("xpos", 3), ("xquat", 4), ("cvel", 6), ("subtree_com", 3), ("cacc", 6), ("cfrc_int", 6)];
@@ -479,34 +367,62 @@ impl DeviceMirror {
             let needed = name != "cfrc_int" || capture.fields.contains(StateFields::JOINT_WRENCHES);
             arrays.push(if needed { self.read(name, width * nbody)? } else { Vec::new() });
         }
-        rows.for_each(&mut |env, row| {
-            if row.diverged.is_some() {
-                return;
-            }
-            let gravity = StoredRow { row, model }.gravity();
-            let solved = &mut row.cold.captured;
-            if let Some(contacts) = contacts.get(env) {
-                capture.capture_contacts(contacts, solved);
-            }
-            if motion {
-                let bodies = DeviceBodies::new(&arrays, env, model);
-                capture.capture_motion(&bodies, gravity, solved);
+        rows.visit(&|chunk| {
+            let mut bodies = DeviceBodies::new(model);
+            for (k, row) in chunk.rows.iter_mut().enumerate().filter(|(_, row)| row.diverged.is_none()) {
+                let env = chunk.first + k;
+                let gravity = StoredRow { row, model }.gravity();
+                let solved = &mut row.cold.captured;
+                if let Some(contacts) = &contacts {
+                    capture.capture_contacts(contacts.of_env(env), solved);
+                }
+                if motion {
+                    bodies.load(&arrays, env);
+                    capture.capture_motion(&bodies, gravity, solved);
+                }
             }
         });
         Ok(())
     }
 }
 
-/// Number of controls that drives have.
-fn table_width(table: &DriveTable) -> usize {
-    table.drives.iter().map(|drive| drive.ctrl + 1).max().unwrap_or(0)
+impl Results {
+    /// Writes the results of environment `env` to its row.
+    fn write_to(
+        &self,
+        row: &mut EnvRow,
+        env: usize,
+        model: &Model,
+        table: &DriveTable,
+        row_drives: &[usize],
+        effort: &mut Vec<f64>,
+    ) {
+        let [qacc, actuator, constraint, forces] = row.solved.parts_mut(model);
+        for (from, to) in self.solved.iter().zip([qacc, actuator, constraint]) {
+            copy(from, env, to);
+        }
+        let nu = model.nu();
+        if forces.len() == nu {
+            copy(&self.forces, env, forces);
+        }
+        effort.clear();
+        effort.extend(table.drives.iter().map(|drive| f64::from(self.forces[env * nu + drive.ctrl])));
+        for (k, &drive) in row_drives.iter().enumerate() {
+            effort[drive] = f64::from(self.efforts[env * row_drives.len() + k]);
+        }
+        row.drives.finish_step(effort);
+    }
 }
 
-/// Makes the next step send the state of an environment.
-fn forget(sent: &mut [Sent], env: usize) {
-    for array in sent.iter_mut().filter(|array| array.input.is_state()) {
-        array.values[env * array.width..(env + 1) * array.width].fill(f32::NAN);
-    }
+/// Notes `steps` steps in a row whose time has them.
+fn note_steps(row: &mut EnvRow, steps: u64) {
+    row.steps = row.steps.saturating_add(steps);
+    row.solved_current = false;
+    row.is_forward_counted = false;
+    row.is_pass_impossible = false;
+    // No `mjData` holds this row any longer.
+    row.version = 0;
+    row.cold.captured.clear();
 }
 
 /// Copies the row of an environment.
@@ -523,38 +439,4 @@ fn divergence(reason: &str) -> Divergence {
         "qacc" => Divergence::Warning(Warning::BadAcceleration),
         other => Divergence::Engine(EngineError { message: other.into() }),
     }
-}
-
-/// Adds the arrays in which the model of an environment changed.
-fn add_model_writes(
-    env: usize,
-    row: &StoredRow<'_>,
-    before: Option<&ModelPatch>,
-    writes: &mut ModelWrites,
-) -> Result<(), DeviceError> {
-    let now = row.row.patch.as_deref();
-    let mut names: Vec<&str> =
-        before.into_iter().chain(now).flat_map(|patch| patch.arrays().map(|(name, _)| name)).collect();
-    names.sort_unstable();
-    names.dedup();
-    for name in names {
-        if let Some(array) = MODEL_ARRAYS.into_iter().find(|array| array.name() == name) {
-            let (envs, values) = writes.entry(array.name()).or_default();
-            envs.push(env as i32);
-            values.extend(array.all(row.model, now).iter().map(|x| *x as f32));
-        } else if !UNREAD_ARRAYS.contains(&name) {
-            let names: Vec<&str> = MODEL_ARRAYS.iter().map(|array| array.name()).collect();
-            return Err(DeviceError::Unsupported {
-                what: format!("own values of `{name}` in environment {env}"),
-                expected: format!("it can randomize {} and gravity", names.join(", ")),
-            });
-        }
-    }
-    let gravity = |patch: Option<&ModelPatch>| patch.map_or_else(|| row.model.gravity(), ModelPatch::gravity);
-    if gravity(before) != gravity(now) {
-        let (envs, values) = writes.entry("gravity").or_default();
-        envs.push(env as i32);
-        values.extend(gravity(now).map(|x| x as f32));
-    }
-    Ok(())
 }

@@ -1,22 +1,25 @@
 //! Physics on another device: MuJoCo Warp on a GPU, behind the same scenes, drives, sensors and snapshots.
 //!
 //! The environments keep their rows on the CPU. Before a step, the [`DeviceMirror`] sends the device what changed in
-//! them: states, targets, gains, applied forces, properties. Afterwards it writes the new states back to the rows, so
-//! everything that reads rows works as before: sensors, cameras, kinematics, recordings, views. Forces of contacts,
-//! accelerations and joint wrenches come from the solution on the device.
+//! them: states, targets, gains, applied forces, properties. Before rows are read again, it writes the new states to
+//! them, so everything that reads rows works as before: sensors, cameras, kinematics, recordings, views. Forces of
+//! contacts, accelerations and joint wrenches come from the solution on the device.
 //!
 //! ```text
 //! rows -> DeviceMirror -> DevicePhysics (worker process, or a Python object in process) -> DeviceMirror -> rows
 //! ```
 
 mod captured;
+mod inputs;
 mod mirror;
+mod model_writes;
 mod scene;
 #[cfg(test)]
 mod tests;
 mod worker;
 
-pub(crate) use mirror::{DeviceMirror, EnvRows};
+pub(crate) use inputs::{Changes, SentRows};
+pub(crate) use mirror::{ChunkRows, DeviceMirror, EnvRows};
 pub(crate) use scene::DeviceScene;
 
 use serde::{Deserialize, Serialize};

@@ -1,7 +1,7 @@
 //! A compiled scene as the device loads it: the MJCF document with its files, the drives, and numbers of the compiled
 //! model.
 
-use super::DeviceError;
+use super::{DeviceError, DeviceMirror};
 use crate::drive::table::{DriveTable, Realization};
 use crate::entity_set::EntitySet;
 use crate::mjcf::document::Integrator;
@@ -11,6 +11,7 @@ use crate::simulation_cfg::SimulationManagerCfg;
 use kinetoscope_mujoco::{Model, NumberArray, ObjectKind};
 use serde_json::{Value, json};
 use std::path::Path;
+use std::sync::Arc;
 
 /// Version of the JSON object.
 const VERSION: u32 = 1;
@@ -34,6 +35,7 @@ pub(crate) struct DeviceScene<'a> {
     files: Vec<(String, std::borrow::Cow<'a, [u8]>)>,
     /// JSON object with sizes, drives and numbers of the compiled model.
     json: String,
+    /// True if the scene has a degree of freedom.
     moves: bool,
 }
 
@@ -59,7 +61,7 @@ impl<'a> DeviceScene<'a> {
         if let Some(feature) = model.has_history().then_some("delays of actuators or sensors") {
             return unsupported(feature.into(), "leave them out, or use the device cpu");
         }
-        let table = simulation.batch.read_row(0, |row| std::sync::Arc::clone(row.drives.table()));
+        let table = simulation.batch.read_row(0, |row| Arc::clone(row.drives.table()));
         if let Some(explicit) = table.models.first() {
             let dof = table.drives[explicit.drive].dof;
             let what = format!("the explicit actuator model of the joint at degree of freedom {dof}");
@@ -72,18 +74,28 @@ impl<'a> DeviceScene<'a> {
         Ok(Self { xml: &simulation.xml, files: terrains.chain(files).collect(), json, moves: model.nv() > 0 })
     }
 
-    /// True if the scene has a degree of freedom.
-    pub(crate) fn moves(&self) -> bool {
-        self.moves
-    }
-
-    /// The JSON object.
-    pub(crate) fn json(&self) -> &str {
-        &self.json
+    /// Loads the scene on a device, unless nothing moves in it. All rows are sent before the next step.
+    ///
+    /// # Errors
+    /// The device cannot simulate the scene, failed, or the files of the scene cannot be written to a temporary folder.
+    pub(crate) fn load_on(
+        &self,
+        device: &mut DeviceMirror,
+        table: &Arc<DriveTable>,
+        num_envs: usize,
+    ) -> Result<(), DeviceError> {
+        let failed = |error: std::io::Error| DeviceError::Failed(format!("the scene cannot be written: {error}"));
+        if self.moves {
+            let folder = tempfile::tempdir().map_err(failed)?;
+            self.write_to(folder.path()).map_err(failed)?;
+            device.load(folder.path(), &self.json, num_envs)?;
+        }
+        device.reset_for(table, num_envs);
+        Ok(())
     }
 
     /// Writes `scene.xml` and the files that it names to a folder.
-    pub(crate) fn write_to(&self, folder: &Path) -> std::io::Result<()> {
+    fn write_to(&self, folder: &Path) -> std::io::Result<()> {
         std::fs::write(folder.join("scene.xml"), self.xml)?;
         for (name, bytes) in &self.files {
             let path = folder.join(name);

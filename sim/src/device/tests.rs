@@ -2,17 +2,21 @@
 
 use super::{Device, DeviceError, DeviceMirror, DevicePhysics, UnknownDevice};
 use crate::batch::Batch;
+use crate::capture::{BodyAxis, CaptureRequest};
 use crate::drive::DriveType;
 use crate::drive::gains::{DriveSetting, Gains};
-use crate::drive::table::{Drive, DriveTable, Realization};
+use crate::drive::table::{Drive, DriveState, DriveTable, Realization};
 use crate::env::{EnvStatus, Stage};
+use crate::row::{RowPart, StateArray};
 use kinetoscope_exec::ThreadPool;
 use kinetoscope_mujoco as mj;
+use kinetoscope_scene::StateFields;
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::{Arc, Mutex};
 
-const NUM_ENVS: usize = 5;
+/// More than the calling thread visits alone.
+const NUM_ENVS: usize = 40;
 
 /// A hinge with a drive row above a free box that falls on the ground.
 const SCENE: &str = r#"<mujoco><option timestep="0.002"/><worldbody><geom type="plane" size="9 9 1"/>
@@ -24,6 +28,7 @@ const SCENE: &str = r#"<mujoco><option timestep="0.002"/><worldbody><geom type="
 #[derive(Debug, Default)]
 struct Log {
     writes: Vec<(String, Vec<i32>)>,
+    reads: Vec<String>,
     fails: bool,
 }
 
@@ -34,6 +39,8 @@ struct Reference {
     log: Arc<Mutex<Log>>,
     /// Environments that it reports as diverged in the next step.
     diverges: Vec<usize>,
+    /// Contacts that it reports, as environments and distances.
+    contacts: Vec<(usize, f32)>,
 }
 
 impl Reference {
@@ -78,8 +85,10 @@ impl DevicePhysics for Reference {
     }
 
     fn read(&mut self, array: &str) -> Result<Vec<f32>, DeviceError> {
+        self.log.lock().expect("one thread").reads.push(array.into());
         let model = self.batch.model().clone();
         Ok(match array {
+            "contacts" => self.contacts.iter().flat_map(|(env, distance)| contact(*env, *distance)).collect(),
             "qpos" => self.rows(model.nq(), |env| env.data().qpos().to_vec()),
             "qvel" => self.rows(model.nv(), |env| env.data().qvel().to_vec()),
             "qacc_warmstart" => self.rows(model.nv(), |env| env.data().qacc_warmstart().to_vec()),
@@ -95,7 +104,19 @@ impl DevicePhysics for Reference {
     }
 }
 
+/// A contact of the box of environment `env` with the ground, as the device has it.
+fn contact(env: usize, distance: f32) -> [f32; 19] {
+    let mut numbers = [0.0; 19];
+    (numbers[0], numbers[2], numbers[3], numbers[16]) = (env as f32, 2.0, distance, 9.81);
+    numbers
+}
+
 fn batch() -> Batch {
+    batch_on(2)
+}
+
+/// A batch on this number of threads.
+fn batch_on(threads: usize) -> Batch {
     let text = SCENE.replace("joint=\"\"", "joint=\"hinge\"").replace("<joint type", "<joint name=\"hinge\" type");
     let model = mj::compile(&text, &[]).expect("compiles").into_model();
     let gains = Gains { kp: 30.0, kd: 3.0, max_effort: 5.0, max_velocity: f64::INFINITY };
@@ -103,14 +124,19 @@ fn batch() -> Batch {
     let realization = Realization::ConstraintRow;
     let drive = Drive { qpos: 0, dof: 0, ctrl: 0, realization, initial: gains, setting, range: [-3.0, 3.0] };
     let table = Arc::new(DriveTable { drives: vec![drive], ..Default::default() });
-    Batch::new(&model, &table, NUM_ENVS, 2, ThreadPool::new()).expect("small")
+    Batch::new(&model, &table, NUM_ENVS, threads, ThreadPool::new()).expect("small")
 }
 
 /// A batch on a [`Reference`], and the record of its calls.
 fn on_device(diverges: Vec<usize>) -> (Batch, Arc<Mutex<Log>>) {
+    on_device_with(diverges, 2, Vec::new())
+}
+
+/// A batch on this number of threads and on a [`Reference`] with these contacts, and the record of its calls.
+fn on_device_with(diverges: Vec<usize>, threads: usize, contacts: Vec<(usize, f32)>) -> (Batch, Arc<Mutex<Log>>) {
     let log = Arc::new(Mutex::new(Log::default()));
-    let mut batch = batch();
-    let reference = Reference { batch: self::batch(), log: Arc::clone(&log), diverges };
+    let mut batch = batch_on(threads);
+    let reference = Reference { batch: self::batch(), log: Arc::clone(&log), diverges, contacts };
     let table = batch.read_row(0, |row| Arc::clone(row.drives.table()));
     let mut mirror = DeviceMirror::new(Box::new(reference));
     mirror.reset_for(&table, NUM_ENVS);
@@ -121,7 +147,7 @@ fn on_device(diverges: Vec<usize>) -> (Batch, Arc<Mutex<Log>>) {
 /// Positions, velocities, efforts, times and steps.
 fn state(batch: &Batch) -> Vec<f64> {
     let mut values = Vec::new();
-    batch.for_each_row(|_, row| {
+    batch.for_each_row(RowPart::Results, |_, row| {
         values.extend_from_slice(row.raw_qpos());
         values.extend_from_slice(row.qvel());
         values.extend_from_slice(&row.drives.effort);
@@ -132,7 +158,7 @@ fn state(batch: &Batch) -> Vec<f64> {
 
 fn command(batch: &mut Batch) {
     for env in 0..NUM_ENVS {
-        batch.edit_row(env, |row, _| row.drives.position[0] = 0.25 * env as f64 - 0.5);
+        batch.edit_row(env, |row, _| row.drives.position[0] = 0.25 * (env % 5) as f64 - 0.5);
     }
     batch.write_at(3, Stage::Raw, |env| env.write_state(|data| data.qvel_mut()[1] = 0.5));
     batch.edit_row(4, |row, _| row.drives.applied[6] = 0.125);
@@ -205,7 +231,7 @@ fn failure() {
     let before = state(&device);
     device.step(2);
     assert_eq!(state(&device), before);
-    device.for_each_row(|env, row| assert!(row.diverged.is_some(), "environment {env}"));
+    device.for_each_row(RowPart::Clock, |env, row| assert!(row.diverged.is_some(), "environment {env}"));
     let error = device.device_failure().expect("failed").to_string();
     assert_eq!(error, "the physics on the device failed: the cable was pulled");
 }
@@ -234,6 +260,148 @@ fn wrenches() {
     assert!(error < 2.0 * 50.0 * 10.0 * 8.0 * 2.0_f64.powi(-24), "{error}");
     let writes = &log.lock().expect("one thread").writes;
     assert_eq!(writes.iter().filter(|(name, envs)| name == "xfrc_applied" && envs.contains(&1)).count(), 50);
+}
+
+/// Removes the names of the arrays that were read, from the record.
+fn taken_reads(log: &Mutex<Log>) -> Vec<String> {
+    std::mem::take(&mut log.lock().expect("one thread").reads)
+}
+
+/// Removes the writes from the record.
+fn taken_writes(log: &Mutex<Log>) -> Vec<(String, Vec<i32>)> {
+    std::mem::take(&mut log.lock().expect("one thread").writes)
+}
+
+/// A step reads nothing; a reader reads the arrays that it needs, once for all environments.
+#[test]
+fn reads() {
+    const STATE: [&str; 3] = ["qpos", "qvel", "qacc_warmstart"];
+    const RESULTS: [&str; 5] = ["qacc", "qfrc_actuator", "qfrc_constraint", "actuator_force", "effort"];
+    type Act = fn(&mut Batch);
+    let of_row: Act = |batch| {
+        for env in 0..NUM_ENVS {
+            batch.read_row(env, |row| assert_eq!(row.steps(), 4));
+        }
+    };
+    let nested: Act = |batch| batch.read_data(1, |_| assert_eq!(state(batch).len(), NUM_ENVS * 18));
+    let accelerations: Act = |batch| drop(batch.gather_state(StateArray::Accelerations, &[0_usize], |place| *place));
+    let cases: [(&str, Act, &[&[&str]]); 10] = [
+        ("one array", accelerations, &[&["qacc_warmstart"]]),
+        ("nothing", |_| {}, &[]),
+        ("time", |batch| batch.for_each_row(RowPart::Clock, |_, row| assert_eq!(row.steps(), 4)), &[]),
+        ("targets", |batch| command_drives(batch), &[]),
+        ("positions", |batch| batch.for_each_row(RowPart::State, |_, row| assert!(row.time() > 0.0)), &[&STATE]),
+        ("rows", of_row, &[&STATE, &RESULTS]),
+        ("a read in a read", nested, &[&STATE, &RESULTS]),
+        ("bodies", |batch| drop(batch.body_rows(|bodies| [bodies.steps() as f64])), &[&STATE, &RESULTS]),
+        ("a write", |batch| batch.write_at(0, Stage::Raw, |_| ()), &[&STATE, &RESULTS]),
+        ("another batch", |batch| drop(batch.take_device()), &[&STATE, &RESULTS]),
+    ];
+    for (name, act, arrays) in cases {
+        let (mut batch, log) = on_device(Vec::new());
+        batch.step(3);
+        batch.step(1);
+        act(&mut batch);
+        assert_eq!(taken_reads(&log), arrays.concat(), "{name}");
+        if batch.is_on_device() {
+            act(&mut batch);
+            assert_eq!(taken_reads(&log), [""; 0], "{name}, again");
+        }
+    }
+}
+
+fn command_drives(batch: &mut Batch) {
+    for env in 0..NUM_ENVS {
+        batch.edit_row(env, |row, _| row.drives.position[0] += 0.125);
+    }
+}
+
+/// Rows that are read after every step, and rows that are read at the end, are the same, and so is what is sent; for any
+/// number of threads.
+#[test]
+fn threads_and_reads() {
+    let contacts = vec![(7, 0.5), (0, 1.5), (39, 2.5), (7, 3.5), (40, 4.5), (0, 5.5), (7, 6.5)];
+    let model = batch().model().clone();
+    let carriers: Vec<usize> = (0..model.nbody()).collect();
+    let capture = CaptureRequest {
+        body_axis: Arc::new(BodyAxis::new(&model, &[], &[], &[], &carriers)),
+        fields: StateFields::CONTACTS,
+    };
+    let run = |threads: usize, is_read: bool| {
+        let (mut batch, log) = on_device_with(vec![11], threads, contacts.clone());
+        command(&mut batch);
+        let mut values = Vec::new();
+        for k in 0..6 {
+            batch.step_and_visit(1 + k % 2, (k > 3).then_some(&capture), None, |_, _| ());
+            if is_read {
+                state(&batch);
+            }
+            let dofs: Vec<usize> = (0..7).collect();
+            values.extend(batch.gather_state(StateArray::Velocities, &dofs, |dof| *dof).mapv(f64::to_bits));
+            if k % 2 == 0 {
+                command_drives(&mut batch);
+            }
+            // Before the reset, a diverged environment is read.
+            if k == 3 {
+                batch.run_in(&[5, 11, 30], |_, env| env.reset(|data, _| data.qvel_mut()[0] = 0.25));
+            }
+        }
+        values.extend(state(&batch).iter().map(|x| x.to_bits()));
+        let mut lists = Vec::new();
+        batch.for_each_row(RowPart::Clock, |_, row| {
+            lists.push(row.captured().contacts.iter().map(|contact| contact.distance).collect::<Vec<_>>());
+        });
+        (values, lists, taken_writes(&log))
+    };
+    let expected = run(1, true);
+    let lists = &expected.1;
+    assert_eq!([&lists[0], &lists[7], &lists[39]], [&vec![1.5, 5.5], &vec![0.5, 3.5, 6.5], &vec![2.5]]);
+    assert_eq!(lists.concat().len(), 6, "environment 40 does not exist");
+    for (threads, is_read) in [(1, false), (2, true), (2, false), (3, true), (3, false)] {
+        assert_eq!(run(threads, is_read), expected, "{threads} threads, read after every step: {is_read}");
+    }
+}
+
+/// An array that environments share is sent once; each change of an own array is sent, also one in place.
+#[test]
+fn shared_arrays() {
+    let (mut batch, log) = on_device(Vec::new());
+    batch.step(1);
+    taken_writes(&log);
+    let sent = |batch: &mut Batch, env: usize, act: &dyn Fn(&mut DriveState)| {
+        batch.edit_row(env, |row, _| act(&mut row.drives));
+        batch.step(1);
+        taken_writes(&log)
+    };
+    let of = |names: &[&str]| names.iter().map(|name| (name.to_string(), vec![3])).collect::<Vec<_>>();
+    assert_eq!(sent(&mut batch, 3, &|_| ()), []);
+    for value in [1.0, 2.0, 3.0] {
+        assert_eq!(sent(&mut batch, 3, &|drives| drives.velocity[0] = value), of(&["target_velocity"]), "{value}");
+        assert_eq!(sent(&mut batch, 3, &|drives| drives.applied[1] = value), of(&["qfrc_applied"]), "{value}");
+        assert_eq!(sent(&mut batch, 3, &|drives| drives.gains[0].kp = value), of(&["stiffness"]), "{value}");
+    }
+    assert_eq!(sent(&mut batch, 3, &|drives| drives.velocity[0] = 3.0), []);
+    let before = batch.read_row(3, |row| row.drives.velocity.as_ptr());
+    assert_eq!(sent(&mut batch, 3, &|drives| drives.velocity[0] = 4.0), of(&["target_velocity"]));
+    let after = batch.read_row(3, |row| row.drives.velocity.as_ptr());
+    assert_eq!(before, after, "an own array is not copied in a write");
+    // The shared arrays again, with the values from before.
+    assert_eq!(sent(&mut batch, 3, &|drives| drives.reset()), of(&["qfrc_applied", "target_velocity"]));
+}
+
+/// Rows that were not read when the device failed keep the last state that was.
+#[test]
+fn failure_of_unread_rows() {
+    let (mut device, log) = on_device(Vec::new());
+    device.step(2);
+    let before = state(&device);
+    device.step(2);
+    log.lock().expect("one thread").fails = true;
+    device.step(2);
+    assert_eq!(state(&device), before);
+    device.for_each_row(RowPart::Clock, |env, row| {
+        assert!(matches!(row.status(), EnvStatus::Diverged { step: 2, .. }), "environment {env}");
+    });
 }
 
 #[test]

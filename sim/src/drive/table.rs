@@ -113,6 +113,18 @@ impl<T: Clone> DerefMut for CowArray<T> {
     }
 }
 
+impl<T> CowArray<T> {
+    /// True if both share one array.
+    pub(crate) fn is_same(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.0, &other.0)
+    }
+
+    /// True if the array has another owner.
+    pub(crate) fn is_shared(&self) -> bool {
+        Arc::strong_count(&self.0) > 1
+    }
+}
+
 impl<T: Copy + PartialEq> CowArray<T> {
     /// Writes `value` if it differs, so that equal values keep the array shared.
     pub(super) fn set_if_changed(&mut self, index: usize, value: T) {
@@ -306,7 +318,7 @@ impl DriveState {
     }
 
     /// Coefficients of the damping inside the drive solve, in the order of [`DriveTable::damped`].
-    pub(crate) fn damping(&self) -> &[f64] {
+    pub(crate) fn damping(&self) -> &CowArray<f64> {
         &self.damping
     }
 

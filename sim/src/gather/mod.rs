@@ -6,7 +6,7 @@ mod rows;
 use self::rows::ChunkRows;
 use crate::capture::CaptureRequest;
 use crate::env::{EnvStatus, SimEnv, Stage};
-use crate::row::StoredRow;
+use crate::row::{RowPart, StoredRow};
 use crate::simulation::Simulation;
 use kinetoscope_mujoco as mj;
 use kinetoscope_scene::StateFields;
@@ -77,7 +77,7 @@ pub(crate) fn allocate(simulation: &Simulation, requires: StateFields) -> SceneS
 
 /// Writes physics steps since the last reset and times of all environments to `state`.
 pub(crate) fn gather_steps(simulation: &Simulation, substeps: u32, state: &mut SceneState) {
-    simulation.batch.for_each_row(|i, row| fill_clock(row, i, substeps, state));
+    simulation.batch.for_each_row(RowPart::Clock, |i, row| fill_clock(row, i, substeps, state));
 }
 
 /// Writes steps and times of environment `i`.
@@ -91,7 +91,7 @@ fn fill_clock(row: StoredRow<'_>, i: usize, substeps: u32, state: &mut SceneStat
 /// diverged environment gets [`Phases::QUARANTINED`].
 pub(crate) fn gather_step_counts(simulation: &Simulation, substeps: u32, clocks: &mut Vec<u64>) {
     clocks.resize(simulation.batch.num_envs(), 0);
-    simulation.batch.for_each_row(|i, row| {
+    simulation.batch.for_each_row(RowPart::Clock, |i, row| {
         let runs = *row.status() == EnvStatus::Running;
         clocks[i] = if runs { row.steps() / u64::from(substeps) } else { Phases::QUARANTINED };
     });
@@ -162,8 +162,7 @@ pub(crate) fn step_and_gather(
     memory: &mut GatherMemory,
 ) {
     let filler = Filler::new(simulation, requires, state, memory);
-    let stage = filler.stage().unwrap_or(Stage::Raw);
-    simulation.batch.step_and_visit(steps * substeps, capture, stage, |i, env| filler.fill(i, env));
+    simulation.batch.step_and_visit(steps * substeps, capture, filler.stage(), |i, env| filler.fill(i, env));
     filler.finish(memory);
     gather_steps(simulation, substeps, state);
     gather_contacts(simulation, requires, state);
@@ -172,7 +171,7 @@ pub(crate) fn step_and_gather(
 /// Fills the contacts, if `requires` names them, in the order of the environments.
 fn gather_contacts(simulation: &Simulation, requires: StateFields, state: &mut SceneState) {
     if requires.contains(StateFields::CONTACTS) {
-        simulation.batch.for_each_row(|i, row| contacts::fill(row.row, i, state));
+        simulation.batch.for_each_row(RowPart::Clock, |i, row| contacts::fill(row.row, i, state));
     }
 }
 

@@ -8,6 +8,7 @@ use crate::ids::EnvId;
 use crate::indexing::MjcfIndexing;
 use crate::objects::rows::{ArgumentSpec, EnvRows, check_unique_columns, unique_envs};
 use crate::pattern;
+use crate::row::{RowPart, StateArray};
 use crate::sensor_list::SensorList;
 use crate::simulation::Simulation;
 use kinetoscope_mujoco::{Model, mjcf_keywords};
@@ -137,13 +138,13 @@ impl<'a> MjcfPart<'a> {
     /// Velocities of its joints in MuJoCo's layout \[m/s, rad/s\], shape (N, nv).
     #[doc(alias = "get_qvel")]
     pub fn qvel(&self) -> Array2<f64> {
-        self.simulation.batch.gather_stored(&self.indices().dofs, |row, &place| row.qvel()[place])
+        self.simulation.batch.gather_state(StateArray::Velocities, &self.indices().dofs, |place| *place)
     }
 
     /// Controls of its actuators as set, not clamped, in the units that the file gives them, shape (N, nu).
     #[doc(alias = "get_ctrl")]
     pub fn ctrl(&self) -> Array2<f64> {
-        self.simulation.batch.gather_stored(&self.indices().controls, |row, &place| row.ctrl()[place])
+        self.simulation.batch.gather_stored(RowPart::Inputs, &self.indices().controls, |row, &place| row.ctrl()[place])
     }
 
     /// Forces of its actuators as MuJoCo last solved them \[N or N m\], shape (N, nu): those of the last step, also

@@ -10,7 +10,7 @@ use crate::objects::rigid_object::{RigidObject, RigidObjectMut};
 use crate::objects::rigid_object_data::BodyType;
 use crate::objects::rows::{ArgumentSpec, EnvRows, unique_envs};
 use crate::randomization::Property;
-use crate::row::StoredRow;
+use crate::row::{RowPart, StoredRow};
 use crate::wrenches::{Wrench, WrenchFrame};
 use kinetoscope_mujoco::NumberArray;
 use nalgebra::{UnitQuaternion, Vector3};
@@ -91,7 +91,7 @@ impl RigidObject<'_> {
     /// Reads `K` numbers of each environment.
     fn read_values<const K: usize>(&self, read: impl Fn(&StoredRow<'_>) -> [f64; K]) -> Array2<f64> {
         let mut values = vec![[0.0; K]; self.simulation.batch.num_envs()];
-        self.simulation.batch.for_each_row(|i, row| values[i] = read(&row));
+        self.simulation.batch.for_each_row(RowPart::Inputs, |i, row| values[i] = read(&row));
         values.into()
     }
 }

@@ -11,7 +11,7 @@ use crate::ids::EnvId;
 use crate::indexing::{JointIndexing, RobotIndexing};
 use crate::objects::free_body::{FreeBody, FreeBodyMut};
 use crate::objects::rows::{ArgumentSpec, EnvRows, NumberKind, check_unique_indices, unique_envs};
-use crate::row::StoredRow;
+use crate::row::{RowPart, StateArray, StoredRow};
 use crate::sensor_list::SensorList;
 use crate::simulation::Simulation;
 use kinetoscope_mujoco as mj;
@@ -134,27 +134,27 @@ impl<'a> Robot<'a> {
     /// Joint positions \[rad or m\], shape (N, dof).
     #[doc(alias = "get_qpos")]
     pub fn qpos(&self) -> Array2<f64> {
-        self.gather(|env, joint| env.raw_qpos()[joint.qpos])
+        self.joint_states(StateArray::Positions, |joint| joint.qpos)
     }
 
     /// Joint velocities \[rad/s or m/s\], shape (N, dof).
     #[doc(alias = "get_qvel")]
     pub fn qvel(&self) -> Array2<f64> {
-        self.gather(|env, joint| env.qvel()[joint.dof])
+        self.joint_states(StateArray::Velocities, |joint| joint.dof)
     }
 
     /// Efforts of the drives in the last MuJoCo step, after the effort limit \[N m or N\], shape (N, dof). They include
     /// the efforts of [`set_qf_target`](RobotMut::set_qf_target). 0 for joints without a drive, and after a reset.
     #[doc(alias = "get_qf")]
     pub fn qf(&self) -> Array2<f64> {
-        self.gather(|env, joint| joint.drive.map_or(0.0, |d| env.drives.effort[d]))
+        self.gather(RowPart::Results, |env, joint| joint.drive.map_or(0.0, |d| env.drives.effort[d]))
     }
 
     /// Position targets \[rad or m\], shape (N, dof). A mimic joint has the position that its driver's target implies;
     /// a joint without a drive has its current position.
     #[doc(alias = "get_target_qpos")]
     pub fn qpos_target(&self) -> Array2<f64> {
-        let mut targets = self.gather(|env, joint| match joint.drive {
+        let mut targets = self.gather(RowPart::Inputs, |env, joint| match joint.drive {
             Some(d) => env.drives.position[d],
             None => env.raw_qpos()[joint.qpos],
         });
@@ -227,9 +227,22 @@ impl<'a> Robot<'a> {
         Ok(self.simulation.batch.body_rows(|bodies| to_row(&frame.pose(bodies))))
     }
 
+    /// Reads a number of each joint, all with one degree of freedom, from the states of all environments.
+    pub(super) fn joint_states(
+        &self,
+        array: StateArray,
+        place: impl Fn(&JointIndexing) -> usize + Sync,
+    ) -> Array2<f64> {
+        self.simulation.batch.gather_state(array, &self.indexing().joints, place)
+    }
+
     /// Reads a number of each joint, all with one degree of freedom, from the rows of all environments.
-    pub(super) fn gather(&self, read: impl Fn(&StoredRow<'_>, &JointIndexing) -> f64) -> Array2<f64> {
-        self.simulation.batch.gather_stored(&self.indexing().joints, read)
+    pub(super) fn gather(
+        &self,
+        part: RowPart,
+        read: impl Fn(&StoredRow<'_>, &JointIndexing) -> f64 + Sync,
+    ) -> Array2<f64> {
+        self.simulation.batch.gather_stored(part, &self.indexing().joints, read)
     }
 }
 

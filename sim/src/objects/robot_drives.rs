@@ -12,6 +12,7 @@ use crate::ids::EnvId;
 use crate::objects::robot::{JointRows, Robot, RobotMut};
 use crate::objects::robot_data::JointIndex;
 use crate::objects::rows::{NumberKind, unique_envs};
+use crate::row::RowPart;
 use ndarray::{Array2, ArrayView2, AsArray, Ix2};
 use std::sync::Arc;
 
@@ -20,20 +21,20 @@ impl Robot<'_> {
     /// drive. Randomized values are included.
     #[doc(alias = "get_stiffness")]
     pub fn stiffness(&self) -> Array2<f64> {
-        self.gather(|env, joint| joint.drive.map_or(0.0, |drive| env.drives.settings[drive].stiffness))
+        self.gather(RowPart::Inputs, |env, joint| joint.drive.map_or(0.0, |drive| env.drives.settings[drive].stiffness))
     }
 
     /// Damping of the drives, in the unit of each [drive type](DriveType), shape (N, dof); 0 for joints without a
     /// drive. Randomized values are included. The viscous friction of the joint itself is not part of it.
     #[doc(alias = "get_damping")]
     pub fn damping(&self) -> Array2<f64> {
-        self.gather(|env, joint| joint.drive.map_or(0.0, |drive| env.drives.settings[drive].damping))
+        self.gather(RowPart::Inputs, |env, joint| joint.drive.map_or(0.0, |drive| env.drives.settings[drive].damping))
     }
 
     /// Drive types, which give stiffness and damping their meaning, shape (N, dof); `None` for joints without a drive.
     #[doc(alias = "get_drive_types")]
     pub fn drive_types(&self) -> Array2<DriveType> {
-        self.simulation.batch.gather_stored(&self.indexing().joints, |env, joint| {
+        self.simulation.batch.gather_stored(RowPart::Inputs, &self.indexing().joints, |env, joint| {
             joint.drive.map_or(DriveType::None, |drive| env.drives.settings[drive].drive_type)
         })
     }
@@ -41,11 +42,13 @@ impl Robot<'_> {
     /// Delays of the drives \[MuJoCo steps\], shape (N, dof); 0 for joints without a [`DelayedPd`] drive.
     #[doc(alias = "get_delay")]
     pub fn delay(&self) -> Array2<u32> {
-        let delays = self.gather(|env, joint| match joint.drive.and_then(|drive| env.drives.table().model_of(drive)) {
-            Some(ExplicitDrive { model: ActuatorModel::DelayedPd(_), memory, .. }) => {
-                f64::from(DelayedPd::delay_of(&env.drives.memory[memory.clone()]))
+        let delays = self.gather(RowPart::Inputs, |env, joint| {
+            match joint.drive.and_then(|drive| env.drives.table().model_of(drive)) {
+                Some(ExplicitDrive { model: ActuatorModel::DelayedPd(_), memory, .. }) => {
+                    f64::from(DelayedPd::delay_of(&env.drives.memory[memory.clone()]))
+                }
+                _ => 0.0,
             }
-            _ => 0.0,
         });
         delays.mapv(|steps| steps as u32)
     }

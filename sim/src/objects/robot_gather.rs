@@ -7,7 +7,7 @@ use crate::indexing::RobotIndexing;
 use crate::objects::free_body::world_velocity;
 use crate::objects::robot::Robot;
 use crate::objects::robot_state::{direction_of_gravity, heading};
-use crate::row::StoredRow;
+use crate::row::{RowPart, StoredRow};
 use kinetoscope_scene::Pose;
 use kinetoscope_scene::pose::{from_row, to_row};
 use nalgebra::Vector3;
@@ -109,7 +109,7 @@ impl Robot<'_> {
         let (batch, indexing) = (&self.simulation.batch, self.indexing());
         let Some(values) = state.values.as_slice_mut() else { return };
         match indexing.root.free_joint {
-            Some((qpos, dof)) => batch.read_stored(values, |row, out| {
+            Some((qpos, dof)) => batch.read_stored(RowPart::Results, values, |row, out| {
                 let (root, joints) = out.split_at_mut(ROOT_COLUMNS);
                 root.copy_from_slice(&free_root_values(row, qpos, dof));
                 read_joints(row, indexing, joints);

@@ -8,6 +8,7 @@ use crate::ids::EnvId;
 use crate::objects::robot::{JointRows, Robot, RobotMut};
 use crate::objects::robot_data::JointIndex;
 use crate::objects::rows::{ArgumentSpec, EnvRows, NumberKind, unique_envs};
+use crate::row::RowPart;
 use ndarray::{Array2, Array3, ArrayView3, AsArray, Ix2, Ix3};
 use std::sync::Arc;
 
@@ -35,7 +36,8 @@ impl Robot<'_> {
     /// configuration or [`set_qvel_limits`](RobotMut::set_qvel_limits) gives others. Only [`DcMotor`](crate::DcMotor)
     /// uses them; nothing else enforces them.
     pub fn qvel_limits(&self) -> Array2<f64> {
-        let mut limits = self.gather(|env, joint| joint.drive.map_or(f64::NAN, |d| env.drives.gains[d].max_velocity));
+        let mut limits = self
+            .gather(RowPart::Inputs, |env, joint| joint.drive.map_or(f64::NAN, |d| env.drives.gains[d].max_velocity));
         for ((_, joint), limit) in limits.indexed_iter_mut().filter(|(_, limit)| limit.is_nan()) {
             *limit = self.data.plans()[joint].max_velocity;
         }
@@ -46,7 +48,8 @@ impl Robot<'_> {
     /// limit of its file or configuration, which bounds the effort of [`set_qf_target`](RobotMut::set_qf_target). A
     /// mimic joint has no limit.
     pub fn qf_limits(&self) -> Array2<f64> {
-        let mut limits = self.gather(|env, joint| joint.drive.map_or(f64::NAN, |d| env.drives.gains[d].max_effort));
+        let mut limits =
+            self.gather(RowPart::Inputs, |env, joint| joint.drive.map_or(f64::NAN, |d| env.drives.gains[d].max_effort));
         for ((_, joint), limit) in limits.indexed_iter_mut().filter(|(_, limit)| limit.is_nan()) {
             let plan = &self.data.plans()[joint];
             *limit = if plan.mimic.is_some() { f64::INFINITY } else { plan.max_effort };
@@ -58,7 +61,7 @@ impl Robot<'_> {
     fn range_limits(&self, of: impl Fn([f64; 2]) -> [f64; 2]) -> Array3<f64> {
         let joints = &self.indexing().joints;
         let mut limits = Array3::zeros((self.simulation.batch.num_envs(), joints.len(), 2));
-        self.simulation.batch.for_each_row(|i, env| {
+        self.simulation.batch.for_each_row(RowPart::Inputs, |i, env| {
             for (j, (joint, plan)) in joints.iter().zip(self.data.plans()).enumerate() {
                 let [low, high] = of(joint.drive.map_or(plan.target_range, |drive| env.drives.ranges[drive]));
                 (limits[(i, j, 0)], limits[(i, j, 1)]) = (low, high);

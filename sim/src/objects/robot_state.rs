@@ -10,7 +10,7 @@ use crate::objects::robot::{Robot, RobotMut};
 use crate::objects::robot_data::JointIndex;
 use crate::objects::rows::NumberKind;
 use crate::pattern::{self, PatternError};
-use crate::row::StoredRow;
+use crate::row::{RowPart, StateArray, StoredRow};
 use kinetoscope_robot::description::LinkId;
 use kinetoscope_scene::Pose;
 use kinetoscope_scene::pose::to_row;
@@ -104,20 +104,20 @@ impl Robot<'_> {
     #[doc(alias = "get_qacc")]
     pub fn qacc(&self) -> Array2<f64> {
         // The warm start is the acceleration of the last step, and a new forward pass keeps it.
-        self.gather(|env, joint| env.qacc_warmstart()[joint.dof])
+        self.joint_states(StateArray::Accelerations, |joint| joint.dof)
     }
 
     /// Velocity targets \[rad/s or m/s\], shape (N, dof); 0 for joints without a drive.
     #[doc(alias = "get_target_qvel")]
     pub fn qvel_target(&self) -> Array2<f64> {
-        self.gather(|env, joint| joint.drive.map_or(0.0, |drive| env.drives.velocity[drive]))
+        self.gather(RowPart::Inputs, |env, joint| joint.drive.map_or(0.0, |drive| env.drives.velocity[drive]))
     }
 
     /// Effort targets of [`set_qf_target`](RobotMut::set_qf_target) as set, not clamped \[N m or N\], shape (N, dof); 0
     /// for mimic joints. Only the effort of a passive joint is clamped to its limit.
     #[doc(alias = "get_target_qf")]
     pub fn qf_target(&self) -> Array2<f64> {
-        self.gather(|env, joint| match joint.drive {
+        self.gather(RowPart::Inputs, |env, joint| match joint.drive {
             Some(drive) => env.drives.feedforward[drive],
             None => env.drives.applied[joint.dof],
         })

@@ -6,6 +6,7 @@ use crate::error::{Error, Result};
 use crate::ids::EnvId;
 use crate::objects::robot::{Robot, RobotMut};
 use crate::objects::rows::{ArgumentSpec, EnvRows, check_unique_indices, unique_envs};
+use crate::row::RowPart;
 use crate::wrenches::{Wrench, WrenchFrame};
 use kinetoscope_robot::description::LinkId;
 use nalgebra::Vector3;
@@ -37,7 +38,7 @@ impl Robot<'_> {
     pub fn gravity_compensation(&self) -> Array2<bool> {
         let links = &self.indexing().links;
         let mut weightless = Array2::from_elem((self.simulation.batch.num_envs(), links.len()), false);
-        self.simulation.batch.for_each_row(|i, env| {
+        self.simulation.batch.for_each_row(RowPart::Inputs, |i, env| {
             for (l, link) in links.iter().enumerate() {
                 weightless[(i, l)] = env.wrenches().gravity_compensated.contains(&link.body);
             }

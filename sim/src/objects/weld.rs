@@ -8,6 +8,7 @@ use crate::ids::EnvId;
 use crate::indexing::WeldIndexing;
 use crate::manager::SimulationManager;
 use crate::objects::rows::unique_envs;
+use crate::row::RowPart;
 use crate::sensor_list::SensorList;
 use crate::simulation::Simulation;
 use kinetoscope_mujoco as mj;
@@ -38,7 +39,7 @@ impl<'a> Weld<'a> {
     pub fn is_attached(&self) -> Array1<bool> {
         let WeldIndexing { equality, .. } = self.simulation.welds[self.index];
         let mut attached = Array1::from_elem(self.simulation.batch.num_envs(), false);
-        self.simulation.batch.for_each_row(|i, env| {
+        self.simulation.batch.for_each_row(RowPart::Inputs, |i, env| {
             attached[i] = env.welds().iter().any(|weld| weld.equality == equality);
         });
         attached

@@ -26,7 +26,7 @@ pub use terms::{Randomization, RandomizationOp, RandomizationTerm};
 use crate::available_memory::available_memory;
 use crate::env::SimEnv;
 use crate::error::Result;
-use crate::row::EnvRow;
+use crate::row::{EnvRow, RowPart};
 use crate::simulation::Simulation;
 use kinetoscope_mujoco::ModelPatch;
 use kinetoscope_scene::{EnvScene, RenderSceneError};
@@ -76,7 +76,7 @@ impl Simulation {
         let tables = self.tables();
         let table = tables.get(property);
         let Some(element) = table.names.iter().position(|of| of == name) else { return };
-        self.batch.for_each_row(|env, row| {
+        self.batch.for_each_row(RowPart::Inputs, |env, row| {
             let own = self.property_overrides[env].get(property, tables, row.model, row.patch.as_deref());
             read(env, own.map_or(table.nominal[element], |values| values[element]));
         });
