@@ -178,3 +178,15 @@ def test_refused_welds_leave_the_simulation():
     sim.update(3)
     assert np.isfinite(robot.qpos).all()
     sim.destroy()
+
+
+def test_refused_sizes_leave_the_simulation():
+    sim, robot = arm(DEVICE)
+    sim.add_rigid_object(uid="cube", shape=ks.ObjectShape.box(size=[0.1] * 3))
+    term = ks.RandomizationTerm(property="size", pattern="cube", draw=ks.RandomizationOp.scale([0.8, 1.2]))
+    for change in (lambda: sim.randomize([term]), lambda: sim.set_property("size", "cube", [0.04] * 3)):
+        with pytest.raises(ks.KinetoscopeError, match='the size of "cube" cannot differ between environments: a device has one size'):
+            change()
+    sim.update(3)
+    assert np.isfinite(robot.qpos).all()
+    sim.destroy()

@@ -134,6 +134,7 @@ impl Simulation {
                 properties.load(&self.overrides_in(index, row.patch.as_ref()), &row.drives);
                 change(index, &mut properties)?;
                 let own = properties.overrides();
+                self.check_for_device(tables, &own)?;
                 let patch = maker.prepare(&properties, &own, index, row.row)?;
                 let stored = StoredOverrides::new(&own, tables, row.model, patch.model_patch());
                 let looks_other = [Property::Size, Property::Color].into_iter().any(|property| {
@@ -151,6 +152,18 @@ impl Simulation {
             })?;
         }
         Ok((made, others))
+    }
+
+    /// Refuses own values that a device cannot give to its environments.
+    fn check_for_device(&self, tables: &PropertyTables, own: &PropertyOverrides) -> Result<(), RandomizationError> {
+        let own = own[Property::Size as usize].as_deref();
+        let Some(sizes) = own.filter(|_| self.batch.is_on_device()) else { return Ok(()) };
+        let (table, width) = (tables.get(Property::Size), Property::Size.width());
+        let elements = sizes.chunks(width).zip(table.nominal.chunks(width)).zip(&table.names);
+        let changed = elements.into_iter().find(|((own, nominal), _)| own != nominal);
+        let Some((_, name)) = changed else { return Ok(()) };
+        let reason = "a device has one size for all environments; use the device cpu, or a simulation for each size";
+        Err(RandomizationError::NoSizeProperty { name: name.clone(), reason })
     }
 
     /// Render scenes of environments with these own values; empty while the scene is not rendered.

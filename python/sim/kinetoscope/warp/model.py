@@ -170,6 +170,8 @@ def prepare(model: Any, dofs: list[int], silent: list[int]) -> None:
     """Gives every driven degree of freedom a friction row, and silences actuators; their `ctrl` is still stored."""
     import mujoco
 
+    # Friction rows then are entries of a diagonal, in place of dense rows.
+    model.opt.jacobian = mujoco.mjtJacobian.mjJAC_SPARSE
     # Any positive value makes MuJoCo build the row; the drive kernel writes its limit in every step.
     model.dof_frictionloss[dofs] = 1.0
     model.actuator_gainprm[silent] = 0.0
