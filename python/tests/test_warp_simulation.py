@@ -142,6 +142,33 @@ def test_snapshots_move_between_devices():
     sim.destroy()
 
 
+def test_threads_and_reads_change_nothing():
+    """Rows are copied when they are read, on all threads."""
+
+    def run(threads, is_read):
+        # More environments than one thread copies alone.
+        sim, robot = arm(DEVICE, num_envs=40, threads=threads)
+        seen = []
+        for k in range(1, 11):
+            robot.set_qpos_target(np.outer(np.linspace(-0.05, 0.05, 40) * k, np.ones(6)))
+            sim.update(2)
+            if is_read:
+                seen.append((robot.qpos, robot.qf))
+        results = [robot.qpos, robot.qvel, robot.qf, np.asarray(sim.time)]
+        sim.destroy()
+        return results
+
+    expected = run(1, True)
+    assert np.abs(expected[0]).max() > 0.1, "it moves"
+    for threads, is_read in ((1, False), (2, True), (2, False), (3, False)):
+        for number, (one, other) in enumerate(zip(run(threads, is_read), expected, strict=True)):
+            # The order of sums on a GPU, and so the last bits, differ from run to run.
+            if DEVICE == "warp-cpu":
+                assert np.array_equal(one, other), (threads, is_read, number)
+            elif number == 0:
+                assert np.abs(one - other).max() < POSITION, (threads, is_read)
+
+
 def test_arrays_without_a_copy():
     sim, robot = arm(DEVICE)
     robot.set_qpos_target(np.full((3, 6), 0.3))

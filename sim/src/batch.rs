@@ -300,7 +300,7 @@ impl Batch {
         mut outs: [&mut [f64]; K],
     ) {
         let count = self.step_on_device(count, None);
-        self.catch_up(RowPart::Results);
+        self.catch_up(RowPart::All);
         let widths = self.read_at(0, Stage::Raw, |env| read(env).map(<[f64]>::len));
         for (out, width) in outs.iter().zip(widths) {
             assert!(out.len() == self.num_envs * width, "{} numbers for {} x {width}", out.len(), self.num_envs);
@@ -393,7 +393,7 @@ impl Batch {
         job: impl Fn(&mut SimEnv, &mut LockedChunk) + Sync,
         then: impl FnMut(&LockedChunk) + Send,
     ) {
-        self.catch_up(RowPart::Results);
+        self.catch_up(RowPart::All);
         let _running = lock(&self.running);
         let (chunks, workspaces) = (&self.chunks, &self.workspaces);
         for share in &chunks.shares {
@@ -459,7 +459,7 @@ impl Batch {
     /// `index` is not smaller than `num_envs`.
     #[track_caller]
     pub(crate) fn read_at<T>(&self, index: usize, stage: Stage, read: impl FnOnce(&SimEnv) -> T) -> T {
-        self.with_row(index, RowPart::Results, Changes::None, |row| {
+        self.with_row(index, RowPart::All, Changes::None, |row| {
             self.with_workspace(row.version, |workspace| {
                 let lease = Lease::new(workspace, row, false);
                 lease.workspace.reach(stage);
@@ -477,9 +477,9 @@ impl Batch {
     /// `index` is not smaller than `num_envs`.
     #[track_caller]
     pub(crate) fn read_data<T>(&self, index: usize, read: impl FnOnce(&Data) -> T) -> T {
-        let version = self.with_row(index, RowPart::Results, Changes::None, |row| row.version);
+        let version = self.with_row(index, RowPart::All, Changes::None, |row| row.version);
         self.with_workspace(version, |workspace| {
-            self.with_row(index, RowPart::Results, Changes::None, |row| {
+            self.with_row(index, RowPart::All, Changes::None, |row| {
                 Lease::new(workspace, row, false).workspace.reach(Stage::Forward);
             });
             workspace.clear_unsaved_results();
@@ -508,7 +508,7 @@ impl Batch {
     /// `index` is not smaller than `num_envs`.
     #[track_caller]
     pub(crate) fn read_row<T>(&self, index: usize, read: impl FnOnce(StoredRow<'_>) -> T) -> T {
-        self.with_row(index, RowPart::Results, Changes::None, |row| read(StoredRow { row, model: &self.model }))
+        self.with_row(index, RowPart::All, Changes::None, |row| read(StoredRow { row, model: &self.model }))
     }
 
     /// Writes to environment `index`, with a forward pass done before.
@@ -526,7 +526,7 @@ impl Batch {
     /// `index` is not smaller than `num_envs`.
     #[track_caller]
     pub(crate) fn write_at<T>(&mut self, index: usize, stage: Stage, write: impl FnOnce(&mut SimEnv) -> T) -> T {
-        self.with_row(index, RowPart::Results, Changes::All, |row| {
+        self.with_row(index, RowPart::All, Changes::All, |row| {
             self.with_workspace(row.version, |workspace| {
                 let lease = Lease::new(workspace, row, true);
                 lease.workspace.reach(stage);

@@ -230,10 +230,8 @@ pub(crate) enum RowPart {
     Inputs,
     /// Steps, time and divergence.
     Clock,
-    /// Positions, velocities, activations, and accelerations as the start of the next solve.
-    State,
-    /// Results of the last solve: accelerations, forces and efforts.
-    Results,
+    /// The state, and results of the last solve: accelerations, forces and efforts.
+    All,
 }
 
 /// Array of the state.

@@ -46,7 +46,7 @@ impl Batch {
 
     /// Takes the device that steps the environments, to give it to another batch.
     pub(crate) fn take_device(&mut self) -> Option<DeviceMirror> {
-        self.catch_up(RowPart::Results);
+        self.catch_up(RowPart::All);
         self.device.take().map(|device| device.mirror.into_inner().unwrap_or_else(PoisonError::into_inner))
     }
 
@@ -88,7 +88,7 @@ impl Batch {
         items: &[I],
         place: &(impl Fn(&I) -> usize + Sync),
     ) -> Option<Array2<f64>> {
-        let is_behind = |device: &&OnDevice| device.current.load(Ordering::Acquire) < RowPart::State as u8;
+        let is_behind = |device: &&OnDevice| device.current.load(Ordering::Acquire) < RowPart::All as u8;
         let device = self.device.as_ref().filter(is_behind)?;
         let mirror = &mut *lock(&device.mirror);
         let numbers = mirror.read_state(&self.model, array).ok()?;

@@ -28,7 +28,7 @@ impl Batch {
         }
         let mut mask = vec![false; self.num_envs];
         chosen.iter().for_each(|&index| mask[index] = true);
-        self.in_chunks(RowPart::Results, &mut vec![(); self.num_envs], |workspace, taken, _| {
+        self.in_chunks(RowPart::All, &mut vec![(); self.num_envs], |workspace, taken, _| {
             let first = taken.first;
             taken.for_each_row(|k, row| {
                 if mask[first + k] {
@@ -49,7 +49,7 @@ impl Batch {
         read: impl Fn(usize, &SimEnv, &mut [T]) + Sync,
     ) {
         let width = out.len() / self.num_envs;
-        self.in_chunks(RowPart::Results, out, |workspace, taken, out| {
+        self.in_chunks(RowPart::All, out, |workspace, taken, out| {
             let first = taken.first;
             taken.for_each_row(|k, row| {
                 let lease = Lease::new(workspace, row, false);
@@ -70,7 +70,7 @@ impl Batch {
                 read(first + k, &bodies, &mut out[k * width..(k + 1) * width]);
             }
         };
-        self.catch_up(RowPart::Results);
+        self.catch_up(RowPart::All);
         let chunk_size = self.chunks.chunk_size;
         if out.len() <= FEW_ELEMENTS && self.chunks.chunks.iter().all(|chunk| lock(chunk).bodies.is_current()) {
             for (c, (chunk, out)) in self.chunks.chunks.iter().zip(self.parts(out)).enumerate() {
@@ -78,7 +78,7 @@ impl Batch {
             }
             return;
         }
-        self.in_chunks(RowPart::Results, out, |workspace, taken, out| {
+        self.in_chunks(RowPart::All, out, |workspace, taken, out| {
             let Chunk { rows, bodies, .. } = &mut *taken.chunk;
             bodies.update(workspace, rows, model);
             copy(taken.first, &taken.chunk, out);
@@ -221,7 +221,7 @@ impl Batch {
         place: impl Fn(&I) -> usize + Sync,
     ) -> Array2<f64> {
         let on_device = self.gather_on_device(array, items, &place);
-        on_device.unwrap_or_else(|| self.gather_stored(RowPart::State, items, |row, item| array.of(row)[place(item)]))
+        on_device.unwrap_or_else(|| self.gather_stored(RowPart::All, items, |row, item| array.of(row)[place(item)]))
     }
 
     /// Reads a value of the row of each environment and each of `items`, shape (N, items), in parallel. Rows are up to

@@ -79,7 +79,7 @@ impl DeviceMirror {
             writes: Vec::new(),
             states: Default::default(),
             are_states_read: [false; 4],
-            current: RowPart::Results,
+            current: RowPart::All,
             unread_steps: 0,
             failed: None,
             growths: 0,
@@ -97,7 +97,7 @@ impl DeviceMirror {
         self.num_envs = num_envs;
         self.layout = None;
         self.states = Default::default();
-        (self.current, self.unread_steps) = (RowPart::Results, 0);
+        (self.current, self.unread_steps) = (RowPart::All, 0);
         self.failed = None;
     }
 
@@ -149,7 +149,7 @@ impl DeviceMirror {
         });
         self.failed = Some(error);
         // The device is not read again.
-        (self.current, self.unread_steps) = (RowPart::Results, 0);
+        (self.current, self.unread_steps) = (RowPart::All, 0);
     }
 
     fn try_step(
@@ -185,7 +185,7 @@ impl DeviceMirror {
                 .iter()
                 .map(|(env, step, reason)| (*env, self.unread_steps - u64::from(count) + step, reason.as_str()))
                 .collect();
-            self.try_receive(model, RowPart::Results, &ended, rows)?;
+            self.try_receive(model, RowPart::All, &ended, rows)?;
         }
         match capture {
             Some(capture) => self.receive_capture(model, capture, rows),
@@ -287,14 +287,11 @@ impl DeviceMirror {
             return Ok(());
         }
         let (nv, nu) = (model.nv(), model.nu());
-        let is_missing = |wanted| self.current < wanted && wanted <= part;
-        let [clock, state, results] = [RowPart::Clock, RowPart::State, RowPart::Results].map(is_missing);
-        if state {
-            (0..STATE.len()).try_for_each(|k| self.update_state(model, k))?;
-        }
+        let (clock, all) = (self.current < RowPart::Clock, part == RowPart::All);
         let row_drives = self.layout.as_ref().map_or(0, |layout| layout.row_drives().len());
         let mut read = Results::default();
-        if results {
+        if all {
+            (0..STATE.len()).try_for_each(|k| self.update_state(model, k))?;
             for (array, name) in read.solved.iter_mut().zip(["qacc", "qfrc_actuator", "qfrc_constraint"]) {
                 *array = self.read(name, nv)?;
             }
@@ -319,20 +316,19 @@ impl DeviceMirror {
                     continue;
                 }
                 let end = ends.get(env).copied().flatten();
-                let [time, motion @ ..] = row.motion.parts_mut(model);
-                if state {
-                    for (to, from) in motion.into_iter().zip(states) {
-                        copy(from, env, to);
-                    }
-                }
                 if clock {
                     let done = end.map_or(unread, |(steps, _)| steps);
+                    let [time, ..] = row.motion.parts_mut(model);
                     for _ in 0..done {
                         time[0] += model.timestep();
                     }
                     note_steps(row, done);
                 }
-                if results {
+                if all {
+                    let [_, motion @ ..] = row.motion.parts_mut(model);
+                    for (to, from) in motion.into_iter().zip(states) {
+                        copy(from, env, to);
+                    }
                     read.write_to(row, env, model, table, row_drives, &mut effort);
                 }
                 if let Some((_, reason)) = end {

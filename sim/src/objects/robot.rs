@@ -147,7 +147,7 @@ impl<'a> Robot<'a> {
     /// the efforts of [`set_qf_target`](RobotMut::set_qf_target). 0 for joints without a drive, and after a reset.
     #[doc(alias = "get_qf")]
     pub fn qf(&self) -> Array2<f64> {
-        self.gather(RowPart::Results, |env, joint| joint.drive.map_or(0.0, |d| env.drives.effort[d]))
+        self.gather(RowPart::All, |env, joint| joint.drive.map_or(0.0, |d| env.drives.effort[d]))
     }
 
     /// Position targets \[rad or m\], shape (N, dof). A mimic joint has the position that its driver's target implies;

@@ -109,7 +109,7 @@ impl Robot<'_> {
         let (batch, indexing) = (&self.simulation.batch, self.indexing());
         let Some(values) = state.values.as_slice_mut() else { return };
         match indexing.root.free_joint {
-            Some((qpos, dof)) => batch.read_stored(RowPart::Results, values, |row, out| {
+            Some((qpos, dof)) => batch.read_stored(RowPart::All, values, |row, out| {
                 let (root, joints) = out.split_at_mut(ROOT_COLUMNS);
                 root.copy_from_slice(&free_root_values(row, qpos, dof));
                 read_joints(row, indexing, joints);
