@@ -6,12 +6,14 @@
 from __future__ import annotations
 
 import os
+import signal
 
 import numpy as np
 import pytest
 
 import kinetoscope as ks
 from kinetoscope.errors import DeviceError
+from kinetoscope.warp import WarpPhysics
 
 pytestmark = pytest.mark.needs_warp
 
@@ -216,4 +218,47 @@ def test_refused_sizes_leave_the_simulation():
             change()
     sim.update(3)
     assert np.isfinite(robot.qpos).all()
+    sim.destroy()
+
+
+@pytest.mark.parametrize("call", ["write", "step", "read"])
+def test_interrupted_calls_end_first(call, monkeypatch):
+    """Ctrl+C in a call of the physics is raised after it, and does not freeze the environments."""
+    sim, robot = arm(DEVICE)
+    sim.update(1)
+    original = getattr(WarpPhysics, call)
+    sent = []
+
+    def interrupted(physics, *arguments):
+        if not sent:
+            sent.append(call)
+            os.kill(os.getpid(), signal.SIGINT)
+        return original(physics, *arguments)
+
+    monkeypatch.setattr(WarpPhysics, call, interrupted)
+    robot.set_qpos_target(np.full((3, 6), 0.1))
+    with pytest.raises(KeyboardInterrupt):
+        sim.update(1)
+        assert robot.qpos.shape == (3, 6)
+        pytest.fail("Ctrl+C is raised before the next line of the program")
+    assert sent and signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    assert len(sim.diverged) == 0
+    sim.update(5)
+    assert np.abs(robot.qpos).max() > 1e-3, "the arm moves to its targets"
+    sim.destroy()
+
+
+# A pendulum without a drive.
+PENDULUM = """<mujoco><worldbody><body name="arm" pos="0 0 1"><joint name="hinge" axis="0 1 0"/>
+<geom type="capsule" fromto="0 0 0 0.3 0 0" size="0.02" mass="1"/></body></worldbody></mujoco>"""
+
+
+def test_targets_of_joints_without_drives_are_their_positions():
+    """Also before anything else of a step is read."""
+    sim = ks.SimulationManager(num_envs=2, device=DEVICE)
+    robot = sim.add_robot(uid="pendulum", mjcf=ks.MjcfFile(text=PENDULUM), drive={"drive_type": "none"})
+    sim.update(20)
+    targets = robot.qpos_target
+    assert np.array_equal(targets, robot.qpos)
+    assert (np.abs(targets) > 0.05).all()
     sim.destroy()

@@ -48,7 +48,7 @@ struct Chunk {
     bodies: BodyCache,
     /// Changes since a device got the rows.
     changes: Changes,
-    /// What the device has of the rows.
+    /// Inputs that the device has.
     sent: SentRows,
     /// True if a row had wrenches when the device got the rows.
     has_wrenches: bool,

@@ -226,9 +226,9 @@ pub(crate) fn prefetch_after(rows: &[Box<EnvRow>], k: usize, arrays: impl FnOnce
 /// Part of a row that a reader needs. Each part contains the ones before it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum RowPart {
-    /// Inputs, properties and captured quantities, which no device changes.
+    /// Inputs and properties, which no device changes.
     Inputs,
-    /// Steps, time and divergence.
+    /// Steps, time, divergence and captured quantities.
     Clock,
     /// The state, and results of the last solve: accelerations, forces and efforts.
     All,

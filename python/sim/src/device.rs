@@ -2,6 +2,7 @@
 
 use kinetoscope::sim::{Device, DeviceError, DevicePhysics};
 use numpy::{IntoPyArray, PyReadonlyArrayDyn};
+use pyo3::exceptions::PyKeyboardInterrupt;
 use pyo3::prelude::*;
 use std::path::Path;
 
@@ -9,6 +10,8 @@ use std::path::Path;
 #[derive(Debug)]
 pub(crate) struct PythonPhysics {
     object: Py<PyAny>,
+    /// True after the first step of a scene, which compiles kernels and can take minutes.
+    is_compiled: bool,
 }
 
 /// Opens the physics of a device.
@@ -18,7 +21,7 @@ pub(crate) fn open(device: Device) -> Result<Box<dyn DevicePhysics>, DeviceError
         PyResult::Ok(class.call1((device.to_string(),))?.unbind())
     });
     let unavailable = |error: PyErr| DeviceError::Unavailable { device, message: message(&error) };
-    Ok(Box::new(PythonPhysics { object: object.map_err(unavailable)? }))
+    Ok(Box::new(PythonPhysics { object: object.map_err(unavailable)?, is_compiled: false }))
 }
 
 /// Message of an exception, with its class if the exception is not of this package.
@@ -45,10 +48,27 @@ fn failure(error: &PyErr) -> DeviceError {
     }
 }
 
+/// Calls `act`, and raises a Ctrl+C during the call after it.
+fn without_interrupt<T>(object: &Bound<'_, PyAny>, act: impl FnOnce(&Bound<'_, PyAny>) -> PyResult<T>) -> PyResult<T> {
+    let py = object.py();
+    let held = py.import("kinetoscope.warp.interrupts")?.call_method0("HeldInterrupts")?;
+    let result = act(object);
+    if held.call_method0("release")?.extract()? {
+        interrupt(py);
+    }
+    result
+}
+
+/// Makes the interpreter raise KeyboardInterrupt as soon as it runs code of the program.
+fn interrupt(py: Python<'_>) {
+    // It fails only if the module is missing, which belongs to the interpreter.
+    let _ = py.import("_thread").and_then(|thread| thread.call_method0("interrupt_main"));
+}
+
 impl PythonPhysics {
     /// Another reference to the object.
     pub(crate) fn handle(&self) -> Self {
-        Python::attach(|py| Self { object: self.object.clone_ref(py) })
+        Python::attach(|py| Self { object: self.object.clone_ref(py), is_compiled: self.is_compiled })
     }
 
     /// The array of the device with this name.
@@ -56,13 +76,24 @@ impl PythonPhysics {
         self.object.call_method1(py, "tensor", (name,))
     }
 
+    /// Calls `act` with the object. Ctrl+C is raised after the call, so that it does not end in the middle; only a call
+    /// that compiles kernels is interrupted, and fails.
     fn call<T>(&self, act: impl FnOnce(&Bound<'_, PyAny>) -> PyResult<T>) -> Result<T, DeviceError> {
-        Python::attach(|py| act(self.object.bind(py)).map_err(|error| failure(&error)))
+        Python::attach(|py| {
+            let object = self.object.bind(py);
+            if self.is_compiled { without_interrupt(object, act) } else { act(object) }.map_err(|error| {
+                if error.is_instance_of::<PyKeyboardInterrupt>(py) {
+                    interrupt(py);
+                }
+                failure(&error)
+            })
+        })
     }
 }
 
 impl DevicePhysics for PythonPhysics {
     fn load(&mut self, folder: &Path, scene: &str, num_envs: usize) -> Result<(), DeviceError> {
+        self.is_compiled = false;
         self.call(|object| object.call_method1("load", (folder.display().to_string(), scene, num_envs)).map(|_| ()))
     }
 
@@ -75,7 +106,9 @@ impl DevicePhysics for PythonPhysics {
     }
 
     fn step(&mut self, steps: u32, capture: &[&str]) -> Result<String, DeviceError> {
-        self.call(|object| object.call_method1("step", (steps, capture.to_vec()))?.extract())
+        let report = self.call(|object| object.call_method1("step", (steps, capture.to_vec()))?.extract())?;
+        self.is_compiled = true;
+        Ok(report)
     }
 
     fn read(&mut self, array: &str) -> Result<Vec<f32>, DeviceError> {

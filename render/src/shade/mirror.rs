@@ -462,8 +462,7 @@ mod tests {
                             direction: directions.map(|axis| f64::from(axis[k])),
                         };
                         let mut stack = TraversalStack::default();
-                        let hit =
-                            at_level!(level, s => tracer.closest_hit(s, &ray, f64::INFINITY, END_TIME, &mut stack));
+                        let hit = at_level!(all_levels()[0], s => tracer.closest_hit(s, &ray, f64::INFINITY, END_TIME, &mut stack));
                         let is_followed = found >> k & 1 == 1;
                         if hit.as_ref().is_some_and(bounded) {
                             assert!(is_followed, "{ray:?} hits {hit:?}");

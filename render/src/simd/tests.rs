@@ -1,7 +1,7 @@
-//! Each operation of every instruction set gives the bits of plain loops. Kernels use nothing else, so they do, too.
+//! Each operation of every instruction set gives the bits of plain loops, and their combinations the expected numbers.
 
 use super::vector::all_results;
-use super::{DOUBLES, LANES, Scalar, Simd, all_levels, at_level};
+use super::{DOUBLES, F, LANES, M, Scalar, Simd, U, all_levels, at_level};
 use std::fmt::Debug;
 
 /// Numbers with special rules, and powers of two near the ends of integers and of exact numbers.
@@ -207,5 +207,27 @@ fn loads() {
                 arrays(s);
             }
         ));
+    }
+}
+
+/// Comparisons that are made of others, and questions about masks.
+#[test]
+fn comparisons() {
+    fn check<S: Simd>(s: S) {
+        let numbers: [f32; LANES] = std::array::from_fn(|k| k as f32);
+        let (x, y) = (F::new(s, s.load(&numbers)), F::new(s, s.splat(5.0)));
+        let ids = U::new(s, s.load_u(&numbers.map(|x| x as u32)));
+        let five = U::new(s, s.splat_u(5));
+        let found = [x.simd_lt(y), x.simd_le(y), x.simd_gt(y), x.simd_ge(y), x.simd_eq(y)].map(M::to_bitmask);
+        assert_eq!(found, [0x001f, 0x003f, 0xffc0, 0xffe0, 0x0020]);
+        let found = [ids.simd_lt(five), ids.simd_ge(five), ids.simd_eq(five)].map(M::to_bitmask);
+        assert_eq!(found, [0x001f, 0xffe0, 0x0020]);
+        let [none, one, most, all] = [x.simd_lt(x), x.simd_eq(y), !x.simd_eq(y), x.simd_ge(x)];
+        assert_eq!([none, one, most, all].map(M::any_true), [false, true, true, true]);
+        assert_eq!([none, one, most, all].map(M::all_true), [false, false, false, true]);
+        assert_eq!((one | none).to_bitmask() | (most & one).to_bitmask(), 0x0020);
+    }
+    for level in all_levels() {
+        at_level!(level, s => check(s));
     }
 }

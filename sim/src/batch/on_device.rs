@@ -1,7 +1,8 @@
 //! Steps of a batch on a device.
 //!
 //! After a step, rows are behind the device. Every access to rows first calls [`Batch::catch_up`] with the part of the
-//! rows that it needs, on the calling thread and before it locks a chunk.
+//! rows that it needs, on the calling thread and before it locks a chunk. So a closure that holds the lock of a chunk must
+//! not read more of the batch than this part.
 
 use super::{Batch, Chunk, Lease, LockedChunk, lock};
 use crate::capture::CaptureRequest;

@@ -191,7 +191,7 @@ pub(crate) enum Changes {
     All,
 }
 
-/// What the device has of the environments of a chunk. Empty before the first step.
+/// Inputs of the environments of a chunk that the device has. Empty before the first step.
 #[derive(Debug, Default)]
 pub(crate) struct SentRows {
     /// Inputs, except states, that the device has: input by input, with a row per environment. NaN before the first write.
@@ -204,7 +204,7 @@ pub(crate) struct SentRows {
 /// Bit of [`SentEnv::changed`] for the model.
 const MODEL: u32 = 1 << 31;
 
-/// What the device has of an environment.
+/// State of the copy of an environment on the device.
 #[derive(Debug, Default)]
 pub(super) struct SentEnv {
     /// Bit k: the input with index k in the layout changed and is not yet sent. The bit [`MODEL`]: so did the model.
@@ -216,6 +216,8 @@ pub(super) struct SentEnv {
     shared: SharedInputs,
     /// Differences of the model of the environment.
     patch: Option<Arc<ModelPatch>>,
+    /// Time \[s\] and steps of the state in the row, while those of the row are newer.
+    clock: Option<(f64, u64)>,
 }
 
 /// Arrays that several environments have. An array in this list cannot change in place, because it has another owner.
@@ -381,6 +383,18 @@ impl SentRows {
     /// True if the device has the state of the environment at index `k` of the chunk.
     pub(crate) fn has_state(&self, k: usize) -> bool {
         self.envs.get(k).is_some_and(|env| env.has_state)
+    }
+
+    /// Keeps the time \[s\] and the steps of the state in the row at index `k` of the chunk, unless older ones are kept.
+    pub(super) fn keep_clock(&mut self, k: usize, time: f64, steps: u64) {
+        if let Some(env) = self.envs.get_mut(k) {
+            env.clock.get_or_insert((time, steps));
+        }
+    }
+
+    /// Takes what [`keep_clock`](Self::keep_clock) kept.
+    pub(super) fn take_clock(&mut self, k: usize) -> Option<(f64, u64)> {
+        self.envs.get_mut(k).and_then(|env| env.clock.take())
     }
 
     /// Makes the step that follows the next change of the environment at index `k` of the chunk send its state.

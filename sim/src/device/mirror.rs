@@ -43,7 +43,7 @@ pub(crate) struct DeviceMirror {
     num_envs: usize,
     /// Inputs of the scene; `None` before its first step.
     layout: Option<Layout>,
-    /// What is sent in a step, for each input of the layout.
+    /// Rows to send in a step, for each input of the layout.
     writes: Vec<Write>,
     /// Arrays of [`STATE`] as last read.
     states: [Vec<f32>; 4],
@@ -97,6 +97,7 @@ impl DeviceMirror {
         self.num_envs = num_envs;
         self.layout = None;
         self.states = Default::default();
+        self.are_states_read = [false; 4];
         (self.current, self.unread_steps) = (RowPart::All, 0);
         self.failed = None;
     }
@@ -128,21 +129,25 @@ impl DeviceMirror {
             Some(error) => Err(error.clone()),
             None => self.try_step(model, count, capture, rows),
         };
-        self.end(done, rows);
+        self.end(done, model, rows);
     }
 
     /// Brings all rows up to date as far as `part`. If the device fails, all environments count as diverged.
     pub(crate) fn receive(&mut self, model: &Model, part: RowPart, rows: &dyn EnvRows) {
         let done = self.try_receive(model, part, &[], rows);
-        self.end(done, rows);
+        self.end(done, model, rows);
     }
 
-    /// Freezes all environments after an error.
-    fn end(&mut self, done: Result<(), DeviceError>, rows: &dyn EnvRows) {
+    /// Freezes all environments after an error, with the time of their states.
+    fn end(&mut self, done: Result<(), DeviceError>, model: &Model, rows: &dyn EnvRows) {
         let Err(error) = done else { return };
         tracing::error!(target: "kinetoscope_sim", %error, "the physics of the device failed");
         rows.visit(&|chunk| {
-            for row in chunk.rows.iter_mut().filter(|row| row.diverged.is_none()) {
+            for (k, row) in chunk.rows.iter_mut().enumerate().filter(|(_, row)| row.diverged.is_none()) {
+                if let Some((time, steps)) = chunk.sent.take_clock(k) {
+                    row.motion.parts_mut(model)[0][0] = time;
+                    row.steps = steps;
+                }
                 let reason = Divergence::Engine(EngineError { message: error.to_string() });
                 row.diverged = Some(Box::new(EnvStatus::Diverged { step: row.steps, reason }));
             }
@@ -319,12 +324,14 @@ impl DeviceMirror {
                 if clock {
                     let done = end.map_or(unread, |(steps, _)| steps);
                     let [time, ..] = row.motion.parts_mut(model);
+                    chunk.sent.keep_clock(k, time[0], row.steps);
                     for _ in 0..done {
                         time[0] += model.timestep();
                     }
                     note_steps(row, done);
                 }
                 if all {
+                    chunk.sent.take_clock(k);
                     let [_, motion @ ..] = row.motion.parts_mut(model);
                     for (to, from) in motion.into_iter().zip(states) {
                         copy(from, env, to);

@@ -85,7 +85,12 @@ impl DevicePhysics for Reference {
     }
 
     fn read(&mut self, array: &str) -> Result<Vec<f32>, DeviceError> {
-        self.log.lock().expect("one thread").reads.push(array.into());
+        let mut log = self.log.lock().expect("one thread");
+        log.reads.push(array.into());
+        if log.fails {
+            return Err(DeviceError::Failed("the cable was pulled".into()));
+        }
+        drop(log);
         let model = self.batch.model().clone();
         Ok(match array {
             "contacts" => self.contacts.iter().flat_map(|(env, distance)| contact(*env, *distance)).collect(),
@@ -388,7 +393,7 @@ fn shared_arrays() {
     assert_eq!(sent(&mut batch, 3, &|drives| drives.reset()), of(&["qfrc_applied", "target_velocity"]));
 }
 
-/// Rows that were not read when the device failed keep the last state that was.
+/// If the device fails before rows are read, they keep the last state that was copied.
 #[test]
 fn failure_of_unread_rows() {
     let (mut device, log) = on_device(Vec::new());
@@ -401,6 +406,36 @@ fn failure_of_unread_rows() {
     device.for_each_row(RowPart::Clock, |env, row| {
         assert!(matches!(row.status(), EnvStatus::Diverged { step: 2, .. }), "environment {env}");
     });
+}
+
+/// A read in which the device fails: all environments freeze in the state before, with its time, also where the time of
+/// later steps was read.
+#[test]
+fn failed_reads() {
+    let reads: [fn(&mut Batch); 4] = [
+        |batch| drop(state(batch)),
+        |batch| drop(batch.gather_state(StateArray::Velocities, &[0], |place| *place)),
+        |batch| batch.read_row(3, |row| assert_eq!(row.steps(), 2)),
+        |batch| drop(batch.take_device()),
+    ];
+    for (k, read) in reads.into_iter().enumerate() {
+        let (mut device, log) = on_device(Vec::new());
+        device.step(2);
+        let before = state(&device);
+        device.step(3);
+        device.for_each_row(RowPart::Clock, |_, row| assert_eq!(row.steps(), 5));
+        log.lock().expect("one thread").fails = true;
+        read(&mut device);
+        assert_eq!(state(&device), before, "read {k}");
+        device.for_each_row(RowPart::Clock, |env, row| {
+            assert!(matches!(row.status(), EnvStatus::Diverged { step: 2, .. }), "read {k}, environment {env}");
+        });
+        if device.is_on_device() {
+            assert_eq!(device.device_failure(), Some(DeviceError::Failed("the cable was pulled".into())));
+            device.step(1);
+            assert_eq!(state(&device), before, "read {k}");
+        }
+    }
 }
 
 #[test]

@@ -154,7 +154,9 @@ impl<'a> Robot<'a> {
     /// a joint without a drive has its current position.
     #[doc(alias = "get_target_qpos")]
     pub fn qpos_target(&self) -> Array2<f64> {
-        let mut targets = self.gather(RowPart::Inputs, |env, joint| match joint.drive {
+        let is_driven = self.indexing().joints.iter().all(|joint| joint.drive.is_some());
+        let part = if is_driven { RowPart::Inputs } else { RowPart::All };
+        let mut targets = self.gather(part, |env, joint| match joint.drive {
             Some(d) => env.drives.position[d],
             None => env.raw_qpos()[joint.qpos],
         });
