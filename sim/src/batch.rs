@@ -545,6 +545,16 @@ impl Batch {
         self.with_row(index, RowPart::Clock, Changes::Inputs, |row| edit(row, &self.model))
     }
 
+    /// Changes targets and gains of the drives of environment `index`, but not their efforts, which may be behind those of
+    /// a device.
+    ///
+    /// # Panics
+    /// `index` is not smaller than `num_envs`.
+    #[track_caller]
+    pub(crate) fn edit_drives<T>(&mut self, index: usize, edit: impl FnOnce(&mut DriveState) -> T) -> T {
+        self.with_row(index, RowPart::Inputs, Changes::Inputs, |row| edit(&mut row.drives))
+    }
+
     #[track_caller]
     fn with_row<T>(&self, index: usize, part: RowPart, changes: Changes, act: impl FnOnce(&mut Box<EnvRow>) -> T) -> T {
         assert!(index < self.num_envs, "environment {index} of {}", self.num_envs);

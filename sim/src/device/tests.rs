@@ -316,7 +316,7 @@ fn reads() {
 
 fn command_drives(batch: &mut Batch) {
     for env in 0..NUM_ENVS {
-        batch.edit_row(env, |row, _| row.drives.position[0] += 0.125);
+        batch.edit_drives(env, |drives| drives.position[0] += 0.125);
     }
 }
 

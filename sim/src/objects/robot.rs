@@ -350,9 +350,9 @@ impl<'a> RobotMut<'a> {
         let write = self.checked_rows(argument, values, joint_ids, env_ids)?;
         let robot = &self.simulation.robots[self.index];
         for (env, row) in write.rows.iter() {
-            self.simulation.batch.edit_row(env, |env, _| {
+            self.simulation.batch.edit_drives(env, |drives| {
                 for (&joint, &value) in write.joints.iter().zip(row) {
-                    change(&mut env.drives, &robot.joints[joint], &self.data.plans[joint], value);
+                    change(drives, &robot.joints[joint], &self.data.plans[joint], value);
                 }
             });
         }

@@ -227,8 +227,8 @@ impl RobotMut<'_> {
         change: impl Fn(&mut DriveState, usize, f64),
     ) {
         for (env, row) in write.rows.iter() {
-            self.simulation.batch.edit_row(env, |env, _| {
-                drives.iter().for_each(|&(column, _, drive)| change(&mut env.drives, drive, row[column]));
+            self.simulation.batch.edit_drives(env, |state| {
+                drives.iter().for_each(|&(column, _, drive)| change(state, drive, row[column]));
             });
         }
     }
