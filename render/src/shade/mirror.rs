@@ -451,11 +451,11 @@ mod tests {
                     }
                 }
                 for level in all_levels() {
-                    let found = at_level!(level, s => {
+                    let found = at_level!(level, s => s.vectorize(#[inline(always)] || {
                         let v3 = |v: &[[f32; LANES]; 3]| V3 { x: load(s, &v[0]), y: load(s, &v[1]), z: load(s, &v[2]) };
                         let every = splat(s, 0.0).simd_eq(splat(s, 0.0));
                         bounds.may_intersect(s, v3(&origins), v3(&directions), every).to_bitmask()
-                    });
+                    }));
                     for k in 0..LANES {
                         let ray = Ray {
                             origin: origins.map(|axis| f64::from(axis[k])),

@@ -447,7 +447,7 @@ mod tests {
     #[test]
     fn angles() {
         for level in all_levels() {
-            at_level!(level, s => {
+            at_level!(level, s => s.vectorize(#[inline(always)] || {
                 for first in (-1800..1800).step_by(LANES) {
                     let deg: [f64; LANES] = std::array::from_fn(|k| (first + k as i32) as f64 / 10.0);
                     let (y, x) = (deg.map(|deg| deg.to_radians().sin() as f32 * 0.7),
@@ -458,7 +458,7 @@ mod tests {
                     }
                 }
                 assert_eq!(angle(s, splat(s, 0.0), splat(s, 0.0)).array(), [0.0; LANES]);
-            });
+            }));
         }
     }
 
@@ -513,7 +513,7 @@ mod tests {
                 let mut seen = std::collections::HashSet::new();
                 for sixteen in hits.as_chunks::<LANES>().0 {
                     let lanes = |which: usize, axis: usize| sixteen.map(|hit| hit[which][axis]);
-                    let found: Vec<Corners> = at_level!(level, s => {
+                    let found: Vec<Corners> = at_level!(level, s => s.vectorize(#[inline(always)] || {
                         let v3 = |which: usize| V3 {
                             x: load(s, &lanes(which, 0)),
                             y: load(s, &lanes(which, 1)),
@@ -522,7 +522,7 @@ mod tests {
                         let found = tables.at_points(s, shape, lines, v3(0), v3(1));
                         let corners = tables.of_shape(s, shape, lines, &found.numbers);
                         (0..LANES).map(|k| Corners::of(&corners, &found.shares, k)).collect()
-                    });
+                    }));
                     for ([point, normal], found) in sixteen.iter().zip(&found) {
                         let mean =
                             [0, 1, 2].map(|k| (0..3).map(|c| found.shares[c] * found.positions[c][k]).sum::<f32>());

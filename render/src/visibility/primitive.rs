@@ -284,7 +284,7 @@ mod tests {
                 let directions: [[f32; LANES]; 3] =
                     std::array::from_fn(|axis| to.map(|to| to[axis] as f32 - from[axis]));
                 for level in all_levels() {
-                    at_level!(level, s => {
+                    at_level!(level, s => s.vectorize(#[inline(always)] || {
                         let [x, y, z] = directions.each_ref().map(|d| load(s, d));
                         let (o, d) = (V3::splat(s, from), V3 { x, y, z });
                         let [fast, general] = [intersect(s, shape, o, d, 0.01), ray_by_ray(s, shape, o, d, 0.01)];
@@ -305,7 +305,7 @@ mod tests {
                             assert!(off < 5e-3, "{}: {} and {}", shape.name(), t[k], t2[k]);
                             differ += u32::from(!same);
                         }
-                    });
+                    }));
                 }
             }
             assert!(hits > 1000 && differ * 500 < hits, "{}: {differ} of {hits}", shape.name());
@@ -318,10 +318,10 @@ mod tests {
         let ball = kinetoscope_scene::shape::RenderMesh::new(&Shape::from(Sphere { radius: 0.5 }).tessellate(8), 0.5);
         let shape = Shape::from(kinetoscope_scene::shape::Mesh { mesh: std::sync::Arc::new(ball) });
         for level in all_levels() {
-            at_level!(level, s => {
+            at_level!(level, s => s.vectorize(#[inline(always)] || {
                 let (o, d) = (V3::splat(s, [0.0, 0.0, 2.0]), V3::splat(s, [0.0, 0.0, -1.0]));
                 assert!(!intersect(s, &shape, o, d, 0.01).hit.any_true());
-            });
+            }));
         }
     }
 }

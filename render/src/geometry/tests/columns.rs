@@ -10,7 +10,7 @@ use crate::geometry::shape::mesh::{Mesh, MeshBvh};
 use crate::geometry::shape::{Intersections, RayShape, ShapeVisitor};
 use crate::geometry::triangle::{ShearedPacket, ShearedRay, Triangle};
 use crate::geometry::world::{RayHit, RayWorld};
-use crate::simd::{Scalar, all_levels, at_level};
+use crate::simd::{Scalar, Simd, all_levels, at_level};
 use kinetoscope_scene::Ray;
 use kinetoscope_scene::mesh::TriMesh;
 use kinetoscope_scene::shape::{RenderMesh, Shape};
@@ -42,12 +42,12 @@ fn compare(tree: &Arc<MeshBvh>, columns: Option<&Columns>, rays: &[Ray], max_dis
         let packet = Packet::from_rays(rays, max_distance);
         for (index, level) in all_levels().into_iter().enumerate() {
             let mut touches: Intersections = [None; WIDTH];
-            let by_columns = at_level!(level, s => match ShearedPacket::new(s, &packet) {
+            let by_columns = at_level!(level, s => s.vectorize(#[inline(always)] || match ShearedPacket::new(s, &packet) {
                 Some(shear) if are_steep(s, &shear) && columns.axes() == shear.axes() => {
                     columns.intersect_packet(s, tree, &packet, &shear, &mut touches)
                 }
                 _ => false,
-            });
+            }));
             if by_columns {
                 count.columns += usize::from(index == 0);
                 let alone = |ray: &Ray| mesh.intersect(ray, max_distance, &mut TraversalStack::default());

@@ -9,7 +9,7 @@ use crate::geometry::shape::mesh::{Mesh, MeshBvh};
 use crate::geometry::shape::{RayGeometry, RayShape, ShapeVisitor};
 use crate::geometry::triangle::{ShearedPacket, Triangle};
 use crate::geometry::world::{RayHit, RayTargets, RayWorld};
-use crate::simd::{all_levels, at_level};
+use crate::simd::{Simd, all_levels, at_level};
 use kinetoscope_scene::Ray;
 use kinetoscope_scene::shape::Intersection;
 use kinetoscope_scene::shape::Shape;
@@ -38,7 +38,9 @@ impl ShapeVisitor for Compare<'_> {
             *self.hits += alone.iter().flatten().count();
             for level in all_levels() {
                 let mut touches = [None; WIDTH];
-                at_level!(level, s => shape.intersect_packet(s, &packet, &mut stack, &mut touches));
+                at_level!(level, s => s.vectorize(#[inline(always)] || {
+                    shape.intersect_packet(s, &packet, &mut stack, &mut touches);
+                }));
                 for k in 0..WIDTH {
                     let (one, all) = (bits(&alone[k]), bits(&touches[k]));
                     assert_eq!(one, all, "{}, packet {index}, lane {k}, {level:?}: {:?}", self.what, rays.get(k));
@@ -179,7 +181,7 @@ fn beams() {
     let rays: Vec<Ray> = (0..WIDTH).map(|k| Ray { origin: origin(k), direction: [0.0, 0.0, -1.0] }).collect();
     let packet = Packet::from_rays(&rays, f64::INFINITY);
     for level in all_levels() {
-        at_level!(level, s => {
+        at_level!(level, s => s.vectorize(#[inline(always)] || {
             let shear = ShearedPacket::new(s, &packet).unwrap();
             let beam = Beam::enclosing(s, &packet, &shear, tree.bvh()).unwrap();
             let mut triangle_count = 0;
@@ -194,7 +196,7 @@ fn beams() {
             assert_eq!(walk(128), Traversal::Complete);
             assert_eq!(walk(8), Traversal::OverBudget, "the control");
             assert!(triangle_count >= 30, "{triangle_count}");
-        });
+        }));
     }
 }
 
