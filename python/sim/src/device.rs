@@ -51,9 +51,21 @@ fn failure(error: &PyErr) -> DeviceError {
 /// Calls `act`, and raises a Ctrl+C during the call after it.
 fn without_interrupt<T>(object: &Bound<'_, PyAny>, act: impl FnOnce(&Bound<'_, PyAny>) -> PyResult<T>) -> PyResult<T> {
     let py = object.py();
-    let held = py.import("kinetoscope.warp.interrupts")?.call_method0("HeldInterrupts")?;
+    let is_interrupt = |error: &PyErr| error.is_instance_of::<PyKeyboardInterrupt>(py);
+    let hold = || py.import("kinetoscope.warp.interrupts")?.call_method0("HeldInterrupts");
+    let mut interrupted = false;
+    // An earlier call of the same update may have been interrupted, too.
+    let held = hold().or_else(|error| {
+        interrupted = is_interrupt(&error);
+        if interrupted { hold() } else { Err(error) }
+    })?;
     let result = act(object);
-    if held.call_method0("release")?.extract()? {
+    match held.call_method0("release").and_then(|noted| noted.extract::<bool>()) {
+        Ok(noted) => interrupted |= noted,
+        Err(error) if is_interrupt(&error) => interrupted = true,
+        Err(error) => return Err(error),
+    }
+    if interrupted {
         interrupt(py);
     }
     result
@@ -82,10 +94,11 @@ impl PythonPhysics {
         Python::attach(|py| {
             let object = self.object.bind(py);
             if self.is_compiled { without_interrupt(object, act) } else { act(object) }.map_err(|error| {
+                let failure = failure(&error);
                 if error.is_instance_of::<PyKeyboardInterrupt>(py) {
                     interrupt(py);
                 }
-                failure(&error)
+                failure
             })
         })
     }
