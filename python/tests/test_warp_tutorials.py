@@ -73,9 +73,10 @@ def add_sensors_on_robot(device):
 
     def play():
         sim.update(100)
+        robot = sim["robot"]
         return {
-            "qpos": sim["robot"].qpos, "pose": sim["robot"].root_pose, "hits": sim["height_scanner"]["hits"],
-            "net_forces_w": sim["contact_forces"]["net_forces_w"], "color": sim["camera"]["rgb"],
+            "qpos": robot.qpos, "pose": robot.root_pose, "hits": sim["height_scanner"]["hits"],
+            "forces": sim["contact_forces"]["net_forces_w"] / (9.81 * robot.total_mass), "color": sim["camera"]["rgb"],
             "inverse_distance": 1 / sim["camera"]["distance_to_image_plane"],
         }
 
@@ -91,7 +92,7 @@ def vendor_quadruped(device):
 
     def play():
         sim.update(100)
-        return {"qpos": robot.qpos, "pose": robot.root_pose, "net_forces_w": feet["net_forces_w"]}
+        return {"qpos": robot.qpos, "pose": robot.root_pose, "forces": feet["net_forces_w"] / (9.81 * robot.total_mass)}
 
     return sim, play
 
@@ -145,9 +146,9 @@ def grasp(device):
 GRIP = 3e-3
 # The camera of the quadruped is 0.4 m or more above the ground. There, the inverse of a distance is linear in its pose.
 INVERSE = POSITION / 0.4
-WEIGHT = 511.0
-# The scene, tolerances of its results, and of its images the largest share of pixels beyond them. Tolerances of forces are those
-# of test_warp_simulation.
+# Of forces in weights of the robot, as in test_warp_simulation.
+FORCE = 1e-3
+# The scene, tolerances of its results, and of its images the largest share of pixels beyond them.
 TUTORIALS = {
     "create_robot": (create_robot, {"qpos": POSITION, "qf": EFFORT}, 0.5 * PIXELS * POSITION),
     "create_sensor": (
@@ -155,10 +156,10 @@ TUTORIALS = {
     ),
     "add_sensors_on_robot": (
         add_sensors_on_robot,
-        {"qpos": POSITION, "pose": POSITION, "hits": POSITION, "net_forces_w": 1e-3 * WEIGHT, "inverse_distance": INVERSE},
+        {"qpos": POSITION, "pose": POSITION, "hits": POSITION, "forces": FORCE, "inverse_distance": INVERSE},
         0.5 * PIXELS * POSITION,
     ),
-    "vendor_quadruped": (vendor_quadruped, {"qpos": POSITION, "pose": POSITION, "net_forces_w": 1e-3 * WEIGHT}, 0),
+    "vendor_quadruped": (vendor_quadruped, {"qpos": POSITION, "pose": POSITION, "forces": FORCE}, 0),
     # Less than a twentieth of the pixels are on edges of the hand and the cube.
     "grasp": (grasp, {"lift": GRIP, "pose": GRIP}, 0.05 * PIXELS * GRIP),
 }
