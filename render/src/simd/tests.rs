@@ -131,7 +131,7 @@ fn is_defined(operation: &str, arguments: &[Vec<u64>]) -> impl Fn(usize) -> bool
             // Of two zeros, either may be returned.
             "min_4" | "max_4" | "min_8" => {
                 let (a, b) = (lane(0, k), lane(1, k));
-                !a.is_nan() && !b.is_nan() && !(a == 0.0 && b == 0.0)
+                !(a.is_nan() || b.is_nan() || a == 0.0 && b == 0.0)
             }
             _ => true,
         })
