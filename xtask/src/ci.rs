@@ -8,8 +8,8 @@ use crate::setup::{self, MujocoVersion, Prepared, Requirement, Requirements};
 use crate::source_check::files_below;
 use crate::test::{self, TestArgs};
 use crate::{
-    deny, dependencies, docs_check, examples, import_cycles, language, msrv, mutate, own_time, package, python_cfg,
-    python_package, python_simulation, site, source_check, spelling, wheel,
+    deny, dependencies, docs_check, examples, fuzz, import_cycles, language, msrv, mutate, own_time, package,
+    python_cfg, python_package, python_simulation, site, source_check, spelling, wheel,
 };
 use serde_json::json;
 use std::collections::BTreeSet;
@@ -43,6 +43,8 @@ enum When {
     Quick,
     /// Left out by `--quick`, and on a developer's machine that cannot download the wheel.
     Wheel,
+    /// Left out unless `--only` names it.
+    Named,
 }
 
 #[derive(Debug)]
@@ -162,6 +164,13 @@ const STAGES: &[Stage] = &[
         when: When::Wheel,
         run: |c| python_simulation::test(c.repo),
     },
+    Stage {
+        name: "fuzz",
+        what: "arbitrary input, 20 s for each reader",
+        // It compiles most of the workspace again, for the sanitizer.
+        when: When::Named,
+        run: |c| fuzz::check(c.repo),
+    },
     Stage { name: "leftovers", what: "nothing left behind in the tree", when: When::Full, run: leftovers },
 ];
 
@@ -248,7 +257,7 @@ fn chosen(args: &CiArgs) -> Vec<&'static Stage> {
         .filter(|stage| match &args.only {
             Some(name) => stage.name == name,
             None if args.quick => matches!(stage.when, When::Always | When::Quick),
-            None => stage.when != When::Quick,
+            None => !matches!(stage.when, When::Quick | When::Named),
         })
         .collect()
 }

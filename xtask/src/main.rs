@@ -1,4 +1,4 @@
-//! The project's commands: `cargo xtask demo | test | ci | docs | wheel | bench | physics-report | mutate | bless |
+//! The project's commands: `cargo xtask demo | test | ci | docs | wheel | bench | physics-report | mutate | fuzz | bless |
 //! python-cfg`.
 //!
 //! Every command first installs missing software on the machine (`setup.rs`). This crate depends on no crate with
@@ -6,7 +6,7 @@
 //!
 //! | module | content |
 //! |---|---|
-//! | `demo`, `test`, `ci`, `site` (`docs`), `python_package`, `python_simulation` (`wheel`), `python_cfg`, `bench`, `physics_report`, `mutate`, `bless` | the commands |
+//! | `demo`, `test`, `ci`, `site` (`docs`), `python_package`, `python_simulation` (`wheel`), `python_cfg`, `bench`, `physics_report`, `mutate`, `fuzz`, `bless` | the commands |
 //! | `setup`, `wheel`, `robots`, `python` | installation of MuJoCo, robots and Python packages |
 //! | `run`, `own_time`, `progress` | child processes, their processor time, progress lines |
 //! | `dependencies`, `import_cycles`, `source_check`, `docs_check` | checks of dependencies, import cycles, sources and pages |
@@ -25,6 +25,7 @@ mod deny;
 mod dependencies;
 mod docs_check;
 mod examples;
+mod fuzz;
 mod import_cycles;
 mod language;
 mod msrv;
@@ -83,6 +84,8 @@ enum Task {
     PhysicsReport(physics_report::PhysicsReportArgs),
     /// Mutate the code in many places, one at a time, and report the tests that fail
     Mutate(mutate::MutateArgs),
+    /// Feed arbitrary input to the readers of files and requests, with a nightly compiler
+    Fuzz(fuzz::FuzzArgs),
     /// Rewrite the golden files of the tests with the current output
     Bless(bless::BlessArgs),
     /// Write the configuration classes of the Python package from the Rust structs
@@ -100,6 +103,7 @@ impl Cli {
             Task::Bench(args) => bench::run(repo, args),
             Task::PhysicsReport(args) => physics_report::run(repo, args),
             Task::Mutate(args) => mutate::run(repo, args),
+            Task::Fuzz(args) => fuzz::run(repo, args),
             Task::Bless(args) => bless::run(repo, args),
             Task::PythonCfg(args) => python_cfg::run(repo, args),
         }

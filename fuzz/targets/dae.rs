@@ -1,0 +1,4 @@
+//! COLLADA.
+#![no_main]
+
+libfuzzer_sys::fuzz_target!(|bytes: &[u8]| kinetoscope_fuzz::mesh("input.dae", bytes));
