@@ -69,6 +69,7 @@ const REPAIRED: u8 = 1;
 const REFUSED: u8 = 2;
 
 fn main() -> ExitCode {
+    launcher::print_events();
     ExitCode::from(run(std::env::args_os(), &mut std::io::stdout().lock(), &mut std::io::stderr().lock()))
 }
 

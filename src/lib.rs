@@ -26,6 +26,7 @@ pub use kinetoscope_robot as robot;
 pub use kinetoscope_scene as scene;
 pub use kinetoscope_sensors as sensors;
 pub use kinetoscope_sim as sim;
+#[cfg(feature = "tasks")]
 pub use kinetoscope_tasks as tasks;
 #[cfg(feature = "viewer")]
 pub use kinetoscope_viewer as viewer;

@@ -3,6 +3,7 @@
 use kinetoscope::prelude::*;
 use kinetoscope::record::{Format, OverviewCfg, RecorderCfg, Topic};
 use kinetoscope::scene::mesh::{DaeUpAxis, MeshOptions};
+use kinetoscope::scene::terrain::TileCfg;
 use kinetoscope::sim::inspect::InspectCfg;
 use kinetoscope::sim::{PerJoint, Shard};
 use kinetoscope::tasks::terms::{JointPositionsCfg, TerrainLevelsCfg, UniformVelocityCfg};
@@ -14,14 +15,19 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 use std::fmt::Debug;
 
-/// Asserts that `text` is `cfg`, that both survive a round trip, that an empty text is the default, and that unknown
-/// keys are errors.
+/// Asserts that an empty text is the default, and what `check_complete` does.
 #[track_caller]
 fn check<C: Debug + Default + PartialEq + Serialize + DeserializeOwned>(text: &str, cfg: &C) {
+    assert_eq!(toml::from_str::<C>("").unwrap(), C::default());
+    check_complete(text, cfg);
+}
+
+/// Asserts that `text` is `cfg`, that both survive a round trip, and that unknown keys are errors.
+#[track_caller]
+fn check_complete<C: Debug + PartialEq + Serialize + DeserializeOwned>(text: &str, cfg: &C) {
     assert_eq!(&toml::from_str::<C>(text).unwrap(), cfg, "{text}");
     let written = toml::to_string(cfg).unwrap();
     assert_eq!(&toml::from_str::<C>(&written).unwrap(), cfg, "{written}");
-    assert_eq!(toml::from_str::<C>("").unwrap(), C::default());
     let error = toml::from_str::<C>(&format!("nonsense = 1\n{text}")).unwrap_err().to_string();
     assert!(error.contains("nonsense"), "{error}");
 }
@@ -63,6 +69,12 @@ fn recorder() {
     ] {
         check(&format!("format = \"{name}\""), &RecorderCfg { format: Some(format), ..RecorderCfg::default() });
     }
+}
+
+#[test]
+fn tiles() {
+    let cfg = TileCfg { size: [8.0, 6.0], cell: 0.1, platform: 1.5, seed: 7 };
+    check_complete("size = [8, 6]\ncell = 0.1\nplatform = 1.5\nseed = 7", &cfg);
 }
 
 #[test]

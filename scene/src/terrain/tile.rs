@@ -7,7 +7,8 @@ use ndarray::Array2;
 use serde::{Deserialize, Serialize};
 
 /// Sizes of a tile that do not depend on its type.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct TileCfg {
     /// Lengths along x and y \[m\].
     pub size: [f64; 2],
