@@ -75,8 +75,10 @@ fn docs_rs_features(metadata: &Value) -> XtaskResult<Vec<&str>> {
     let features = facade["metadata"]["docs"]["rs"]["features"].as_array().into_iter().flatten();
     let features: Vec<&str> = features.filter_map(Value::as_str).collect();
     let declared = facade["features"].as_object().into_iter().flatten().map(|(name, _)| name.as_str());
+    let is_default =
+        |name: &str| facade["features"]["default"].as_array().is_some_and(|all| all.iter().any(|d| d == name));
     // `internals` is for tests of this workspace.
-    let documented = declared.filter(|name| !["default", "internals", "record", "viewer"].contains(name));
+    let documented = declared.filter(|name| !["default", "internals"].contains(name) && !is_default(name));
     let missing: Vec<&str> = documented.filter(|name| !features.contains(name)).collect();
     if features.is_empty() || !missing.is_empty() {
         let message = format!("[package.metadata.docs.rs] of {FACADE} has features {features:?}, not {missing:?}");
@@ -177,7 +179,8 @@ mod tests {
     #[test]
     fn features_of_docs_rs() {
         let with = |features: Value| {
-            let declared = json!({"default": ["record"], "record": [], "viewer": [], "lerobot": [], "internals": []});
+            let declared =
+                json!({"default": ["record", "viewer"], "record": [], "viewer": [], "lerobot": [], "internals": []});
             json!({"packages": [
                 {"name": "other"},
                 {"name": FACADE, "features": declared, "metadata": {"docs": {"rs": {"features": features}}}},
