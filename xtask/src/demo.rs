@@ -6,6 +6,10 @@ use crate::setup::{self, Requirements};
 /// Default flags; the user's flags replace them.
 const DEFAULTS: &[(&str, Option<&str>)] = &[("--headless", None), ("--num-envs", Some("4")), ("--steps", Some("2004"))];
 
+/// Crates that the demo compiles unoptimized: a newcomer waits for the build, not for some seconds of simulation.
+/// Their dependencies stay as the tests need them, so the tests do not compile those again.
+const UNOPTIMIZED: [&str; 4] = ["kinetoscope", "kinetoscope-robot", "kinetoscope-sensors", "kinetoscope-sim"];
+
 #[derive(Debug, clap::Args)]
 pub(crate) struct DemoArgs {
     /// Install what is missing without asking
@@ -25,17 +29,23 @@ pub(crate) fn run(repo: &Repo, args: &DemoArgs) -> XtaskResult {
     let mut defaults = DEFAULTS.to_vec();
     defaults.push(("--out", Some(&images)));
     ready
-        .cargo()
+        .cargo_once()
         // Paths in the arguments are relative to the user's working directory, not to the repository.
         .current_dir(".")
-        .args(["run", "--manifest-path"])
+        .arg("run")
+        .args(
+            UNOPTIMIZED.iter().flat_map(|name| ["--config".into(), format!("profile.dev.package.{name}.opt-level=0")]),
+        )
+        .arg("--manifest-path")
         .arg(repo.root.join("Cargo.toml"))
         .args(["--package", "kinetoscope", "--example", "create_sensor"])
         .args(feature_args(&args.args))
         .arg("--")
         .args(merged(&defaults, &args.args))
         .inherit_stdin()
-        .run()
+        .run()?;
+    println!("\nThe demo is built in a short time, and runs slowly. Build your programs with `--release`.");
+    Ok(())
 }
 
 /// Feature flags of cargo. The build dominates the time of the first run, so recordings and the browser view are

@@ -54,6 +54,14 @@ impl Prepared {
         }
     }
 
+    /// Cargo for a build of a clean clone: it keeps nothing for the next build of an edited crate, which saves time and
+    /// gigabytes. The user's own choice counts.
+    pub(crate) fn cargo_once(&self) -> Cmd {
+        const INCREMENTAL: &str = "CARGO_INCREMENTAL";
+        let cargo = self.cargo();
+        if env::var_os(INCREMENTAL).is_some() { cargo } else { cargo.env(INCREMENTAL, "0") }
+    }
+
     /// A program that compiles with the chosen MuJoCo.
     pub(crate) fn program(&self, program: impl AsRef<std::ffi::OsStr>) -> Cmd {
         match &self.choice {

@@ -99,7 +99,7 @@ pub(crate) fn run_packages(repo: &Repo, args: &TestArgs, packages: &[&str]) -> X
     let ready = setup::prepare(repo, Requirements { version: args.mujoco, extras: needs })?;
     let mut left_out = vec![if with_renderer { NEEDS_MUJOCO_2 } else { NEEDS_MUJOCO_4 }];
     // A variable left over from a bless must not turn the tests into a rewrite of the golden files.
-    let mut cargo = ready.cargo().env_remove(crate::bless::VARIABLE);
+    let mut cargo = ready.cargo_once().env_remove(crate::bless::VARIABLE);
     if let Robots::FromPyPi(folder) = robots::obtain(repo)? {
         cargo = cargo.env(robots::VARIABLE, folder);
         left_out.push(NEEDS_VENDOR_ROBOTS);
@@ -183,7 +183,8 @@ mod tests {
         let four = [&version_dependent_packages()[..], &SHARED_FEATURES].concat();
         let render = ["--package", "kinetoscope-python-render", "--features", "shared"];
         let python = ["--package", "kinetoscope-python", "--features", "shared"];
-        let commands: [(&str, &[&str], &[&str]); 6] = [
+        let commands: [(&str, &[&str], &[&str]); 7] = [
+            ("normal,build", &["--package", "xtask"], &[]),
             (all, &["--package", "kinetoscope", "--no-default-features"], &["kinetoscope", "kinetoscope-testkit"]),
             (all, &["--workspace"], &["kinetoscope-cli"]),
             (
