@@ -1,6 +1,7 @@
 //! Compilation of MJCF: text with assets in memory, or files on disk.
 
 use super::error::CompileError;
+use super::input_limits;
 use super::model::Compiled;
 use super::version::{VersionError, check_version};
 use mujoco_sys as mj;
@@ -92,9 +93,10 @@ impl Drop for Vfs {
 ///
 /// # Errors
 /// MuJoCo's version does not match, MuJoCo rejects the model, or an asset is empty or has an invalid or repeated name
-/// (`model.xml` is reserved).
+/// (`model.xml` is reserved), or a length is not a number from -1e8 to 1e8, or copies, pixels or cells are too many.
 pub fn compile(mjcf: &str, assets: &[Asset]) -> Result<Compiled, LoadError> {
     check_version()?;
+    input_limits::check_text(mjcf)?;
     let mut vfs = Vfs::new();
     let model = Asset { name: "model.xml".into(), bytes: mjcf.as_bytes().to_vec() };
     for asset in std::iter::once(&model).chain(assets) {
@@ -119,12 +121,14 @@ pub fn compile(mjcf: &str, assets: &[Asset]) -> Result<Compiled, LoadError> {
 /// Compiles an MJCF file. Files that it names are looked up on disk, by MuJoCo's rules.
 ///
 /// # Errors
-/// MuJoCo's version does not match, or MuJoCo rejects the file.
+/// MuJoCo's version does not match, MuJoCo rejects the file, or a length in it or in a file that it includes is not a number
+/// from -1e8 to 1e8, or copies, pixels or cells are too many.
 pub fn compile_file(path: impl AsRef<Path>) -> Result<Compiled, LoadError> {
     let path = path.as_ref();
     check_version()?;
     let name = CString::new(path.to_string_lossy().as_bytes())
         .map_err(|_| CompileError::new(&format!("{path:?} contains a NUL character")))?;
+    input_limits::check_file(path)?;
     load(&name, std::ptr::null()).map_err(|error| match error {
         LoadError::Compile(error) => error.with_location_in(path).into(),
         other => other,

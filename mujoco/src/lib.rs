@@ -40,6 +40,7 @@ mod editor;
 mod error;
 mod guard;
 mod heap;
+mod input_limits;
 mod jacobian;
 pub mod mjcf_keywords;
 mod model;
