@@ -13,8 +13,9 @@ const LOCAL_FOLDER: &str = "../shared/robots";
 /// BSD-licensed descriptions of some fifty robots. It is installed without dependencies, because the package brings a
 /// loader for Pinocchio.
 const PACKAGE: &str = "example-robot-data==6.0.0";
-/// The folder of robots inside the package.
-const INSIDE: &str = "cmeel.prefix/share/example-robot-data/robots";
+/// The folder inside the package whose `robots` has the robots. It keeps its name: the URDFs have addresses of meshes such as
+/// `package://example-robot-data/robots/ur_description/meshes/base.dae`.
+const INSIDE: &str = "cmeel.prefix/share/example-robot-data";
 
 /// Source of the robots.
 #[derive(Debug, PartialEq, Eq)]
@@ -33,11 +34,11 @@ pub(crate) fn obtain(repo: &Repo) -> XtaskResult<Robots> {
     if std::env::var_os(VARIABLE).is_some() || repo.root.join(LOCAL_FOLDER).is_dir() {
         return Ok(Robots::Complete);
     }
-    let folder = repo.target.join("robots");
+    let folder = repo.target.join("example-robot-data");
     if !folder.is_dir() {
         download(&repo.target, &folder)?;
     }
-    Ok(Robots::FromPyPi(folder))
+    Ok(Robots::FromPyPi(folder.join("robots")))
 }
 
 /// The folder of robots that the environment variable names, or else the one next to the repository; `None` if it does
