@@ -1,12 +1,12 @@
 //! The project's commands: `cargo xtask demo | test | ci | docs | wheel | bench | physics-report | mutate | fuzz | bless |
-//! python-cfg`.
+//! package | python-cfg`.
 //!
 //! Every command first installs missing software on the machine (`setup.rs`). This crate depends on no crate with
 //! MuJoCo, so that it builds before MuJoCo is installed.
 //!
 //! | module | content |
 //! |---|---|
-//! | `demo`, `test`, `ci`, `site` (`docs`), `python_package`, `python_simulation` (`wheel`), `python_cfg`, `bench`, `physics_report`, `mutate`, `fuzz`, `bless` | the commands |
+//! | `demo`, `test`, `ci`, `site` (`docs`), `python_package`, `python_simulation` (`wheel`), `python_cfg`, `bench`, `physics_report`, `mutate`, `fuzz`, `bless`, `package` | the commands |
 //! | `setup`, `wheel`, `robots`, `python` | installation of MuJoCo, robots and Python packages |
 //! | `run`, `own_time`, `progress` | child processes, their processor time, progress lines |
 //! | `dependencies`, `import_cycles`, `source_check`, `docs_check` | checks of dependencies, import cycles, sources and pages |
@@ -88,6 +88,8 @@ enum Task {
     Fuzz(fuzz::FuzzArgs),
     /// Rewrite the golden files of the tests with the current output
     Bless(bless::BlessArgs),
+    /// Make the packages for crates.io, and compile each from its archive
+    Package,
     /// Write the configuration classes of the Python package from the Rust structs
     PythonCfg(python_cfg::PythonCfgArgs),
 }
@@ -105,6 +107,7 @@ impl Cli {
             Task::Mutate(args) => mutate::run(repo, args),
             Task::Fuzz(args) => fuzz::run(repo, args),
             Task::Bless(args) => bless::run(repo, args),
+            Task::Package => package::compile_all(repo),
             Task::PythonCfg(args) => python_cfg::run(repo, args),
         }
     }

@@ -2,7 +2,7 @@
 //! docs.rs builds it.
 
 use crate::run::{Failure, Repo, XtaskResult, in_ci, no_findings};
-use crate::setup::Prepared;
+use crate::setup::{self, Prepared, Requirements};
 use crate::test;
 use serde_json::Value;
 use std::fs::{self, Permissions};
@@ -15,15 +15,24 @@ const FACADE: &str = "kinetoscope";
 /// Folder of the committed declarations of MuJoCo 2.2.2.
 const DECLARATIONS: &str = "mujoco-sys/docs_rs";
 
-/// Checks the manifests and makes all packages, without compiling them again.
+/// The command `cargo xtask package`: makes all packages and compiles each from its archive.
+pub(crate) fn compile_all(repo: &Repo) -> XtaskResult {
+    make(repo, &setup::prepare(repo, Requirements::default())?, &[])
+}
+
+/// The stage `package` of CI: checks the manifests and makes all packages, without compiling them again.
 pub(crate) fn run(repo: &Repo, ready: &Prepared) -> XtaskResult {
+    make(repo, ready, &["--no-verify", "--quiet"])
+}
+
+fn make(repo: &Repo, ready: &Prepared, options: &[&str]) -> XtaskResult {
     let packages = published(&repo.metadata);
     if !packages.iter().any(|package| package["name"] == FACADE) {
         return Err(Failure::new(format!("{FACADE} is not published: its manifest says `publish = false`")));
     }
     let findings: Vec<String> = packages.iter().flat_map(|package| mistakes(package)).collect();
     no_findings("manifests are not ready for publication", &findings)?;
-    let mut cargo = ready.cargo().args(["package", "--no-verify", "--allow-dirty", "--quiet"]);
+    let mut cargo = ready.cargo_once().args(["package", "--allow-dirty"]).args(options);
     for name in packages.iter().filter_map(|package| package["name"].as_str()) {
         cargo = cargo.args(["--package", name]);
     }
