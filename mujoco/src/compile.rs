@@ -89,14 +89,14 @@ impl Drop for Vfs {
     }
 }
 
-/// Compiles MJCF text. Files that it names are looked up in `assets` first, then on disk.
+/// Compiles MJCF text that this program has written. Files that it names are looked up in `assets` first, then on disk. Text of
+/// a user is for [`compile_text`], which has limits of numbers.
 ///
 /// # Errors
 /// MuJoCo's version does not match, MuJoCo rejects the model, or an asset is empty or has an invalid or repeated name
-/// (`model.xml` is reserved), or a length is not a number from -1e8 to 1e8, or copies, pixels or cells are too many.
+/// (`model.xml` is reserved).
 pub fn compile(mjcf: &str, assets: &[Asset]) -> Result<Compiled, LoadError> {
     check_version()?;
-    input_limits::check_text(mjcf)?;
     let mut vfs = Vfs::new();
     let model = Asset { name: "model.xml".into(), bytes: mjcf.as_bytes().to_vec() };
     for asset in std::iter::once(&model).chain(assets) {
@@ -116,6 +116,15 @@ pub fn compile(mjcf: &str, assets: &[Asset]) -> Result<Compiled, LoadError> {
         }
     }
     load(c"model.xml", vfs.0.as_ptr())
+}
+
+/// Compiles MJCF text of a user. Files that it names are looked up on disk.
+///
+/// # Errors
+/// As those of [`compile_file`].
+pub fn compile_text(mjcf: &str) -> Result<Compiled, LoadError> {
+    input_limits::check_text(mjcf)?;
+    compile(mjcf, &[])
 }
 
 /// Compiles an MJCF file. Files that it names are looked up on disk, by MuJoCo's rules.

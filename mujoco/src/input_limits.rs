@@ -135,7 +135,7 @@ fn words(value: &str) -> impl Iterator<Item = (&str, f64)> {
 #[allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
 mod tests {
     use super::*;
-    use crate::{LoadError, compile, compile_file};
+    use crate::{LoadError, compile_file, compile_text};
 
     /// Root cause: MuJoCo's loader got these numbers; with the first row, 2.2.2 did not end.
     #[test]
@@ -157,7 +157,7 @@ mod tests {
             ),
         ] {
             let text = format!("<mujoco>\n<worldbody>\n{element}</worldbody></mujoco>");
-            let Err(LoadError::Compile(error)) = compile(&text, &[]) else { panic!("accepted: {element}") };
+            let Err(LoadError::Compile(error)) = compile_text(&text) else { panic!("accepted: {element}") };
             assert!(error.message.starts_with(expected), "{element}: {error}");
             assert_eq!(error.line, Some(3), "{element}");
         }
@@ -166,7 +166,7 @@ mod tests {
             ("<hfield name='h' size='1 1 1 1' nrow='100000' ncol='100000'/>", "<hfield> has 10000000000 cells"),
         ] {
             let text = format!("<mujoco><asset>{asset}</asset></mujoco>");
-            let Err(LoadError::Compile(error)) = compile(&text, &[]) else { panic!("accepted: {asset}") };
+            let Err(LoadError::Compile(error)) = compile_text(&text) else { panic!("accepted: {asset}") };
             assert_eq!(error.message, format!("{cells}: it must be at most 1e8"));
         }
     }
@@ -176,7 +176,7 @@ mod tests {
     fn accepted() {
         let text = "<mujoco><worldbody><geom type='plane' size='1e8 0 1' pos='0 0 -1e8'/><body><joint type='hinge' \
                     stiffness='1e9' limited='true' range='-1e10 1e10'/><geom size='1' contype='2147483647'/></body></worldbody></mujoco>";
-        compile(text, &[]).unwrap();
+        compile_text(text).unwrap();
     }
 
     /// Included files are checked too; a file that includes itself does not end in a loop here.

@@ -62,7 +62,7 @@ mod version_counts;
 mod visual;
 mod weld;
 
-pub use compile::{Asset, LoadError, compile, compile_file};
+pub use compile::{Asset, LoadError, compile, compile_file, compile_text};
 pub use data::{Data, Overflow, Warning, WarningCounts};
 pub use editor::{DiagonalInertia, ModelEditor};
 pub use error::{CompileError, EngineError};

@@ -19,7 +19,11 @@ pub const RENDERER_VARIABLE: &str = "KINETOSCOPE_PYTHON4";
 fn robot_folders() -> impl Iterator<Item = PathBuf> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap();
     let above = root.ancestors().skip(1).map(|dir| dir.join("shared/robots"));
-    std::env::var_os(ROBOTS_VARIABLE).map(PathBuf::from).into_iter().chain(above).chain([root.join("target/example-robot-data/robots")])
+    std::env::var_os(ROBOTS_VARIABLE)
+        .map(PathBuf::from)
+        .into_iter()
+        .chain(above)
+        .chain([root.join("target/example-robot-data/robots")])
 }
 
 /// Folder with URDF files of real robots.

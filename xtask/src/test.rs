@@ -184,7 +184,7 @@ mod tests {
         let render = ["--package", "kinetoscope-python-render", "--features", "shared"];
         let python = ["--package", "kinetoscope-python", "--features", "shared"];
         let commands: [(&str, &[&str], &[&str]); 7] = [
-            ("normal,build", &["--package", "xtask"], &[]),
+            ("normal,build", &["--package", "xtask"], &["kinetoscope-workspace-hack"]),
             (all, &["--package", "kinetoscope", "--no-default-features"], &["kinetoscope", "kinetoscope-testkit"]),
             (all, &["--workspace"], &["kinetoscope-cli"]),
             (

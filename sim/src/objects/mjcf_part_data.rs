@@ -243,7 +243,7 @@ pub(crate) fn read_and_compile(
 ) -> Result<(String, Model)> {
     let is_file = text.is_none();
     let (text, compiled) = match text {
-        Some(text) => (text.to_string(), mj::compile(text, &[])),
+        Some(text) => (text.to_string(), mj::compile_text(text)),
         None => {
             let read = input_file::read_named_text(path);
             let text = read.map_err(|error| Error::File { path: path.to_path_buf(), error })?;
