@@ -20,6 +20,9 @@ const PREFIX: &str = "kinetoscope_render-";
 const WHEEL: &str = ".whl";
 const SDIST: &str = ".tar.gz";
 
+/// Tag of the wheels: Python 3.10 and later, by the feature of PyO3.
+const ABI: &str = "cp310-abi3";
+
 /// The program that builds wheels from Rust.
 const MATURIN: &str = "maturin==1.16.0";
 
@@ -155,7 +158,7 @@ pub(crate) fn build(repo: &Repo, profile: BuildProfile) -> XtaskResult<PathBuf> 
     remove_wheels(&dir, PREFIX)?;
     let build = Cmd::new(maturin(repo)?).arg("build").env("CARGO_TARGET_DIR", &repo.target);
     profile.configure(repo, build)?.arg("--out").arg(&dir).current_dir(repo.root.join(PACKAGE)).run()?;
-    built_wheel(&dir, PREFIX)
+    built_wheel(&dir, PREFIX, ABI)
 }
 
 /// Cargo profile of a wheel.
@@ -229,13 +232,18 @@ fn check(repo: &Repo, wheel: &Path, profile: BuildProfile) -> XtaskResult {
     if profile == BuildProfile::Portable { check.args(["--glibc", GLIBC]) } else { check }.run()
 }
 
-/// The wheel whose name begins with `prefix`.
+/// The wheel whose name begins with `prefix`, for the versions of Python in the tag `abi`, such as `cp311-abi3`.
 ///
 /// # Errors
-/// There is no such wheel.
-pub(crate) fn built_wheel(dir: &Path, prefix: &str) -> XtaskResult<PathBuf> {
+/// There is no such wheel, or it has another tag: only the Python that built it would load it.
+pub(crate) fn built_wheel(dir: &Path, prefix: &str, abi: &str) -> XtaskResult<PathBuf> {
     let message = || Failure::new(format!("maturin built no wheel in {}", dir.display()));
-    built_files(dir, prefix, WHEEL).into_iter().next().ok_or_else(message)
+    let wheel = built_files(dir, prefix, WHEEL).into_iter().next().ok_or_else(message)?;
+    let name = wheel.file_name().unwrap_or_default().to_string_lossy();
+    if name.contains(&format!("-{abi}-")) {
+        return Ok(wheel);
+    }
+    Err(Failure::new(format!("{name}: the tag is not {abi}, which the feature abi3-py3.. of pyo3 in Cargo.toml gives")))
 }
 
 /// Removes wheels of earlier builds whose names begin with `prefix`.
@@ -323,6 +331,23 @@ mod tests {
         assert_eq!(built_files(dir.path(), PREFIX, WHEEL), [dir.path().join("kinetoscope_render-1.whl")]);
         assert_eq!(built_files(dir.path(), PREFIX, SDIST), [dir.path().join("kinetoscope_render-0.1.0.tar.gz")]);
         assert!(built_files(&dir.path().join("missing"), PREFIX, WHEEL).is_empty());
+    }
+
+    #[test]
+    fn wheels_for_several_versions_of_python() {
+        let dir = tempfile::tempdir().expect("a scratch folder");
+        let found = || built_wheel(dir.path(), PREFIX, ABI).map_err(|failure| failure.message);
+        assert!(found().expect_err("an empty folder").starts_with("maturin built no wheel"));
+        let tags = [("cp311-cp311", false), ("cp311-abi3", false), ("py3-none", false), ("cp310-abi3", true)];
+        for (tag, is_right) in tags {
+            let wheel = dir.path().join(format!("kinetoscope_render-0.1.0-{tag}-linux_x86_64.whl"));
+            wheel::tests::write(&wheel, "");
+            match found() {
+                Ok(path) => assert!(is_right && path == wheel, "{tag}"),
+                Err(message) => assert!(!is_right && message.contains(tag) && message.contains(ABI), "{message}"),
+            }
+            std::fs::remove_file(&wheel).expect("removable");
+        }
     }
 
     #[test]

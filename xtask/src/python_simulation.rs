@@ -4,7 +4,7 @@
 use crate::python;
 use crate::python_package::{self, BuildProfile, built_wheel, create, maturin, remove_wheels, wheels};
 use crate::robots;
-use crate::run::{Cmd, Failure, Repo, XtaskResult};
+use crate::run::{Cmd, Failure, Repo, XtaskResult, in_ci};
 use crate::setup::{self, MujocoVersion, Prepared, Requirement, Requirements};
 use crate::{test, wheel};
 use std::path::{Path, PathBuf};
@@ -15,6 +15,9 @@ const PACKAGE: &str = "python/sim";
 
 /// Beginning of the names of its wheels.
 const PREFIX: &str = "kinetoscope-";
+
+/// Tag of the wheels: Python 3.11 and later, by the feature of PyO3.
+const ABI: &str = "cp311-abi3";
 
 /// Robots and meshes for the wheel: a copy of the folder `assets` while it is built.
 const ASSETS: &str = "python/sim/kinetoscope/assets";
@@ -81,7 +84,7 @@ pub(crate) fn build(repo: &Repo, profile: BuildProfile) -> XtaskResult<PathBuf> 
     let built = build.arg("--out").arg(&dir).current_dir(repo.root.join(PACKAGE)).run();
     remove().map_err(fail)?;
     built?;
-    built_wheel(&dir, PREFIX)
+    built_wheel(&dir, PREFIX, ABI)
 }
 
 /// The stage `python-sim` of CI: builds the wheel and that of the renderer, installs both in an environment, and runs the
@@ -195,7 +198,8 @@ fn prepare(repo: &Repo) -> XtaskResult<Prepared> {
     setup::prepare(repo, Requirements { version: Some(MujocoVersion::Wheel), extras: &[] })
 }
 
-/// The environment of the tests with a version of NumPy, below the target folder.
+/// The environment of the tests with a version of NumPy, below the target folder. CI makes a new one, a developer's machine
+/// keeps it.
 fn environment(repo: &Repo, numpy: &str) -> XtaskResult<PathBuf> {
     let venv = repo.target.join(format!("python-sim-numpy-{numpy}"));
     let python = venv.join("bin/python");
@@ -203,7 +207,8 @@ fn environment(repo: &Repo, numpy: &str) -> XtaskResult<PathBuf> {
         "import cv2, gymnasium, matplotlib, mypy, numpy, pytest, ray, scipy, PIL; assert numpy.__version__ == '{numpy}'"
     );
     let is_ready = || Cmd::new(&python).args(["-c", &check]).quiet().succeeds();
-    if !is_ready() {
+    // An environment of earlier tests could have packages that the wheels do not require.
+    if in_ci() || !is_ready() {
         let core = format!("mujoco-core=={}", wheel::VERSION);
         create(&venv, &[&[core.as_str(), &format!("numpy=={numpy}")][..], &PACKAGES].concat())?;
     }
