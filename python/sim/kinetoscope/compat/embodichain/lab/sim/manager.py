@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import warnings
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -43,6 +43,8 @@ from .sensors import (
 )
 from .shapes import CubeCfg, MeshCfg, SphereCfg
 
+Asset = TypeVar("Asset", Robot, Articulation, RigidObject, RigidObjectGroup, Camera, ContactSensor)
+
 # Fields of RigidBodyAttributesCfg that only PhysX has.
 WITHOUT_MEANING = (
     "contact_offset",
@@ -77,7 +79,7 @@ class SimulationManager(Layer):
         self.window: Any = None
 
     def _build(self) -> NativeSimulationManager:
-        lights = {"lights": self._lights} if self._lights else {}
+        lights: dict[str, Any] = {"lights": self._lights} if self._lights else {}
         return NativeSimulationManager(
             num_envs=self.cfg.num_envs,
             device=str(self.cfg.sim_device),
@@ -200,20 +202,22 @@ class SimulationManager(Layer):
 
     def add_sensor(self, sensor_cfg: CameraCfg | ContactSensorCfg) -> Any:
         """Adds a camera, a pair of cameras, or a contact sensor. Bodies of a contact sensor must exist."""
-        kinds = ((StereoCameraCfg, StereoCamera), (CameraCfg, Camera), (ContactSensorCfg, ContactSensor))
-        kind = next((kind for cfg, kind in kinds if isinstance(sensor_cfg, cfg)), None)
-        if kind is None:
-            raise ConfigError(f"add_sensor: {type(sensor_cfg).__name__} is not the configuration of a sensor")
-        count = sum(type(asset) is kind for asset in self._assets.values())
-        uid = sensor_cfg.uid or f"{kind.__name__.lower()}_{count}"
         if isinstance(sensor_cfg, ContactSensorCfg):
-            return self._register(ContactSensor(self, uid, sensor_cfg))
+            return self._register(ContactSensor(self, sensor_cfg.uid or self._default_uid(ContactSensor), sensor_cfg))
+        if not isinstance(sensor_cfg, CameraCfg):
+            raise ConfigError(f"add_sensor: {type(sensor_cfg).__name__} is not the configuration of a sensor")
+        kind = StereoCamera if isinstance(sensor_cfg, StereoCameraCfg) else Camera
+        uid = sensor_cfg.uid or self._default_uid(kind)
         fields = stereo_cfg(sensor_cfg) if isinstance(sensor_cfg, StereoCameraCfg) else camera_cfg(sensor_cfg)
         render = self.cfg.render_cfg
         if render.renderer not in RENDERERS:
             raise ConfigError(f"RenderCfg.renderer is {render.renderer!r}; known names: {', '.join(RENDERERS)}")
         fields.get("camera", fields)["renderer"] = "hybrid" if self.cfg.enable_rt else RENDERERS[render.renderer]
         return self._register(kind(self, self.native.add_sensor(uid, fields), sensor_cfg))
+
+    def _default_uid(self, kind: type[Layer]) -> str:
+        """Name of a sensor without one."""
+        return f"{kind.__name__.lower()}_{sum(type(asset) is kind for asset in self._assets.values())}"
 
     def add_light(self, cfg: LightCfg) -> None:
         """Adds a light, before anything else is added."""
@@ -266,7 +270,7 @@ class SimulationManager(Layer):
         """Frees the simulation. The process goes on."""
         self.native.destroy()
 
-    def _register(self, asset: Any) -> Any:
+    def _register(self, asset: Asset) -> Asset:
         self._assets[asset.uid] = asset
         return asset
 
