@@ -16,6 +16,7 @@ from kinetoscope.compat import step_limit, unsupported
 from kinetoscope.compat._layer import Layer
 from kinetoscope.compat._poses import to_row
 from kinetoscope.compat._tensors import array, tensor
+from kinetoscope.compat.embodichain.lab.visualization import VisualizationCfg
 from .cfg import (
     ArticulationCfg,
     JointDrivePropertiesCfg,
@@ -57,6 +58,7 @@ WITHOUT_MEANING = (
     "max_linear_velocity",
     "max_angular_velocity",
 )
+BACKENDS = ("none", "viser")
 RENDERERS = {"auto": "raster", "hybrid": "hybrid", "fast-rt": "fast_ray_traced", "rt": "ray_traced"}
 
 
@@ -69,14 +71,17 @@ class SimulationManager(Layer):
         changed("PhysicsCfg", physics, defaults, "bounce_threshold", "enable_ccd", "length_tolerance", "speed_tolerance")
         render = self.cfg.render_cfg
         changed("RenderCfg", render, RenderCfg(), "spp", "tone_mapping_enabled", "tone_mapping_exposure")
-        unsupported(
-            "SimulationManagerCfg", profiler=self.cfg.profiler is not None, visualization=self.cfg.visualization is not None
-        )
+        unsupported("SimulationManagerCfg", profiler=self.cfg.profiler is not None)
+        view = self.cfg.visualization
+        if view is not None and view.backend not in BACKENDS:
+            raise ConfigError(f"VisualizationCfg.backend is {view.backend!r}; known names: {', '.join(BACKENDS)}")
         self._steps = 0
         self._lights: list[native.LightCfg] = []
         self._assets: dict[str, Any] = {}
         self.native = self._build()
         self.window: Any = None
+        self.server: Any = None
+        self._is_shown = view is not None and view.backend == "viser"
 
     def _build(self) -> NativeSimulationManager:
         lights: dict[str, Any] = {"lights": self._lights} if self._lights else {}
@@ -122,6 +127,7 @@ class SimulationManager(Layer):
         if self._assets:
             raise ConfigError("build_multiple_arenas: call it before objects are added, or set num_envs in the configuration")
         self.cfg.num_envs = num
+        self._close_server()
         self.native.destroy()
         self.native = self._build()
 
@@ -132,6 +138,8 @@ class SimulationManager(Layer):
         limit = step_limit()
         if limit is not None and self._steps >= limit:
             raise KeyboardInterrupt
+        if self._is_shown:
+            self.start_visualization()
         self.native.update(step)
         self._steps += step
 
@@ -148,6 +156,26 @@ class SimulationManager(Layer):
         if self.window is not None:
             self.window.close()
             self.window = None
+
+    def start_visualization(self) -> None:
+        """Opens the browser view of ``visualization`` in the configuration and prints its address, as the first ``update``
+        does with the backend ``viser``. It runs in real time."""
+        self._is_shown = True
+        if self.server is None:
+            view = self.cfg.visualization or VisualizationCfg()
+            address = f"{view.viser_server.host}:{view.viser_server.port}"
+            self.server = self.native.serve(address, speed=1.0, max_fps=float(view.scene_fps))
+            print(f"open {self.server.url}", flush=True)
+
+    def stop_visualization(self) -> None:
+        """Closes the browser view."""
+        self._is_shown = False
+        self._close_server()
+
+    def _close_server(self) -> None:
+        if self.server is not None:
+            self.server.close()
+            self.server = None
 
     def add_robot(self, cfg: RobotCfg) -> Robot:
         fields = articulation_fields(cfg)
@@ -234,6 +262,7 @@ class SimulationManager(Layer):
                 cast_shadow=cfg.enable_shadow,
             )
         )
+        self._close_server()
         self.native.destroy()
         self.native = self._build()
 
