@@ -55,6 +55,9 @@ const TESTED: [(&str, &str); 3] = [("2.3.7", "numpy<2"), ("3.3.7", "numpy>=2"), 
 
 #[derive(Debug, clap::Args)]
 pub(crate) struct WheelArgs {
+    /// Also install the wheels with their requirements into a new virtual environment, as users do, and test them there
+    #[arg(long)]
+    install: bool,
     /// Also install the source distribution into a new virtual environment, which compiles it, and render with it
     #[arg(long)]
     install_sdist: bool,
@@ -68,16 +71,21 @@ pub(crate) struct WheelArgs {
 ///
 /// # Errors
 /// Python cannot be set up, a package does not compile, or a wheel contains paths of this machine or, if it is
-/// portable, symbols of a newer glibc.
+/// portable, symbols of a newer glibc. With `--install`: `pip` cannot install the wheels, or a test of them fails.
 pub(crate) fn run(repo: &Repo, args: &WheelArgs) -> XtaskResult {
     let profile = if args.portable { BuildProfile::Portable } else { BuildProfile::Release };
+    let mut wheels = Vec::new();
     for build in [build, python_simulation::build] {
         let wheel = build(repo, profile)?;
         check(repo, &wheel, profile)?;
         println!("{}", wheel.display());
+        wheels.push(wheel);
     }
     let sdist = source_distribution(repo)?;
     println!("{}", sdist.display());
+    if args.install {
+        python_simulation::install_as_users_do(repo, &wheels)?;
+    }
     if args.install_sdist { install_sdist(repo, &sdist) } else { Ok(()) }
 }
 
@@ -310,12 +318,18 @@ fn environment(repo: &Repo, version: &str, numpy: &str) -> XtaskResult<PathBuf> 
     if is_ready() { Ok(python) } else { Err(Failure::new(format!("mujoco {version} cannot be imported"))) }
 }
 
-/// Creates a virtual environment with these packages.
+/// Creates a virtual environment with these packages, in place of an earlier one.
 pub(crate) fn create(venv: &Path, packages: &[&str]) -> XtaskResult {
+    let python = create_empty(venv)?;
+    python::pip_install(&python, packages)
+}
+
+/// Creates a virtual environment without packages, in place of an earlier one, and returns its Python.
+pub(crate) fn create_empty(venv: &Path) -> XtaskResult<PathBuf> {
     setup::try_to_have(Requirement::Pip);
     setup::try_to_have(Requirement::Venv);
     Cmd::new("python3").args(["-m", "venv", "--clear"]).arg(venv).run()?;
-    python::pip_install(&venv.join("bin/python"), packages)
+    Ok(venv.join("bin/python"))
 }
 
 #[cfg(test)]
