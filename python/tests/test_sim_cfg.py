@@ -88,6 +88,11 @@ SIMULATION = {
     "LightCfg": lambda own: {"lights": [own]},
     "Shard": lambda own: {"shard": own},
 }
+# Scenes, in place of the dict of from_scene.
+SCENES = {
+    "SceneCfg": lambda own: own,
+    "ExclusionCfg": lambda own: {"exclude_collisions": [own]},
+}
 # Read by other functions than scene files.
 ARGUMENTS = [
     "FoxgloveCfg", "IkCfg", "InspectCfg", "NullSpacePosture", "OrbitCamera", "Overlays", "OverviewCfg", "Randomization",
@@ -97,6 +102,7 @@ ELSEWHERE = {*ARGUMENTS, "RandomizationTerm"}
 REQUIRED = {
     "ComponentCfg": {"name": "a", "urdf": "a.urdf"},
     "DcMotor": {"saturation_effort": 1.0},
+    "ExclusionCfg": {"pair": ["a", "b"]},
     "Aperture": {"focal_length": 0.05, "f_number": 2.0, "focus_distance": 1.0},
     "TargetFrameCfg": {"bodies": "a"},
     "TileShare": {"tile": {"flat": {}}},
@@ -110,6 +116,8 @@ def read(cls, own):
     """A configuration as Rust reads it, with all its fields."""
     if cls.__name__ in SIMULATION:
         return tomllib.loads(ks.to_toml({"simulation": SIMULATION[cls.__name__](own)}))
+    if cls.__name__ in SCENES:
+        return tomllib.loads(ks.to_toml(SCENES[cls.__name__](own)))
     contained = CONTAINERS.get(cls.__name__, lambda own: {"type": cls._type, **own})(own)
     if "type" not in contained:
         contained = {"type": cls._type, **contained}
@@ -179,10 +187,8 @@ def test_entities_have_default_names(cls):
 # Structs of configurations without a class, and the reason.
 WITHOUT_A_CLASS = {
     "EnvCfg": "its fields are those of TaskCfg",
-    "ExclusionCfg": "a pair of names in from_scene, and the arguments of exclude_collision",
     "ImageWindowCfg": "its fields are the arguments of ImageWindow",
     "JointPositionsCfg": "a term of tasks: a dict with its type",
-    "SceneCfg": "the dict of from_scene: simulation, entities by name, exclude_collisions",
     "TerrainLevelsCfg": "a term of tasks: a dict with its type",
     "TileCfg": "computed from the fields of TerrainGrid",
     "UniformVelocityCfg": "a term of tasks: a dict with its type",
@@ -247,7 +253,7 @@ def test_every_table_of_scene_files_has_a_class():
 
 def test_every_class_is_tested():
     names = {cls.__name__ for cls in CLASSES}
-    known = set(CONTAINERS) | set(SIMULATION) | ELSEWHERE | {cls.__name__ for cls in ENTITIES}
+    known = set(CONTAINERS) | set(SIMULATION) | set(SCENES) | ELSEWHERE | {cls.__name__ for cls in ENTITIES}
     assert names <= known, names - known
     assert {cls._type for cls in ENTITIES} == {
         "robot", "articulation", "rigid_object", "rigid_object_group", "terrain", "mjcf", "weld", "camera",
@@ -272,6 +278,55 @@ def test_only_changed_fields_travel():
     assert legged == tomllib.loads(ks.to_toml({"simulation": {"preset": "legged"}}))
     # A preset may be changed back to a default.
     assert tomllib.loads(ks.to_toml({"simulation": ks.SimulationManagerCfg.legged(impratio=1.0)}))["simulation"]["impratio"] == 1
+
+
+def scene_of(make, pair):
+    """A scene by its constructor, with collision exclusions in the form of ``pair``."""
+    cube = ks.ObjectShape.box(size=[0.1, 0.1, 0.1])
+    return make(
+        simulation=ks.SimulationManagerCfg(num_envs=2, ground=None),
+        entities={"a": ks.RigidObjectCfg(shape=cube), "b": {"type": "rigid_object", "shape": cube}, "imu": ks.ImuCfg(body="a")},
+        exclude_collisions=[pair("a", "b")],
+    )
+
+
+def test_scenes_as_classes():
+    """A SceneCfg has the keys of scene files, by their JSON Schema, and is the scene of the dict."""
+    assert {field.name for field in dataclasses.fields(ks.SceneCfg)} == set(ks.json_schema()["properties"]) - {"$schema"}
+    text = ks.to_toml(scene_of(dict, lambda *pair: pair))
+    assert tomllib.loads(text)["exclude_collisions"] == [["a", "b"]] and tomllib.loads(text)["entities"]["a"]["type"] == "rigid_object"
+    for pair in (lambda *pair: pair, lambda *pair: ks.ExclusionCfg(pair=pair), lambda *pair: {"pair": pair}):
+        for make in (dict, ks.SceneCfg):
+            scene = scene_of(make, pair)
+            assert ks.to_toml(scene) == text
+            sim = ks.SimulationManager.from_scene(scene)
+            assert sim.keys() == ["a", "b", "imu"] and sim.num_envs == 2 and '<exclude body1="a' in sim.mjcf
+    # A control: a scene without the exclusion differs.
+    assert ks.to_toml(dataclasses.replace(scene, exclude_collisions=[])) != text and ks.SceneCfg() == ks.SceneCfg()
+    assert ks.to_toml(ks.SceneCfg()) == ks.to_toml({})
+
+
+@pytest.mark.parametrize(
+    ("scene", "words"),
+    [
+        (lambda: ks.SceneCfg(simulation=ks.WeldCfg()), ("simulation", "WeldCfg", "SimulationManagerCfg")),
+        (lambda: ks.SceneCfg(entities={"x": ks.RobotCfg(drive=ks.WeldCfg())}), ("drive", "WeldCfg", "DriveCfg")),
+        (lambda: ks.SceneCfg(exclude_collisions=[ks.WeldCfg()]), ("exclude_collisions", "WeldCfg", "ExclusionCfg")),
+        (lambda: ks.SceneCfg(exclude_collisions=[["a"]]), ("exclude_collisions[0]", "two names", '["a"]')),
+        (lambda: {"exclude_collisions": [["a", "b"], ["a", 3]]}, ("exclude_collisions[1]", "two names", "3")),
+        (lambda: {"exclude_collisions": "ab"}, ("exclude_collisions",)),
+        (lambda: {"exclude_collisions": [{}]}, ("exclude_collisions[0]", "missing field `pair`")),
+        (lambda: {"exclude_collisions": [["a", "b"], {"pair": ["a", "b"], "pears": 1}]}, ("[1]", "`pears`", "`pair`")),
+        (lambda: ks.RobotCfg(), ("RobotCfg", "SceneCfg", "add_robot")),
+        (lambda: {"simulation": None}, ("simulation", "None")),
+        (lambda: 3, ("int",)),
+    ],
+)
+def test_wrong_scenes(scene, words):
+    for read_scene in (ks.to_toml, ks.SimulationManager.from_scene):
+        with pytest.raises(ks.ConfigError) as error:
+            read_scene(scene())
+        assert all(word in str(error.value) for word in words), error.value
 
 
 def test_none_is_never_a_silent_default():

@@ -1,12 +1,15 @@
 """The example scripts, the notebook and the demo of the package kinetoscope."""
 
 import json
+import os
 import re
 import subprocess
 import sys
 from pathlib import Path
 
 import numpy as np
+import pytest
+from PIL import Image
 
 import kinetoscope as ks
 
@@ -17,6 +20,16 @@ def run(*command, folder):
     result = subprocess.run([sys.executable, *command], capture_output=True, text=True, timeout=200, cwd=folder, check=False)
     assert result.returncode == 0, result.stderr
     return result.stdout
+
+
+def demo(*flags, folder, **variables):
+    """Output of the demo, on no other display than that of ``variables``, and the seconds of its steps."""
+    environment = {key: value for key, value in os.environ.items() if key not in ("DISPLAY", "WAYLAND_DISPLAY")}
+    command = [sys.executable, "-m", "kinetoscope", "demo", *flags]
+    run = {"cwd": folder, "env": environment | variables, "capture_output": True, "text": True, "timeout": 60, "check": False}
+    result = subprocess.run(command, **run)
+    assert result.returncode == 0, result.stderr
+    return result.stdout, float(re.search(r"environments in ([\d.]+) s", result.stdout)[1])
 
 
 def test_reach(tmp_path):
@@ -123,3 +136,27 @@ def test_demo(tmp_path):
     text = run("-m", "kinetoscope", "demo", "--headless", "--steps", "50", "--out", "a.png", folder=tmp_path)
     assert "50 steps of 4 environments" in text and (tmp_path / "a.png").is_file()
     assert run("-m", "kinetoscope", "--version", folder=tmp_path).endswith("MuJoCo 4.0.1\n")
+
+
+@pytest.mark.parametrize("flags", [[], ["--headless"]])
+def test_demo_without_a_display(flags, tmp_path):
+    """The command as the page has it ends by itself, with an image of the arms."""
+    text, _ = demo(*flags, folder=tmp_path)
+    assert "2000 steps of 4 environments" in text and "wrote kinetoscope-demo.png" in text and "--serve" in text
+    # The window's error is only printed where a window was asked for.
+    assert ("DISPLAY" in text) == (not flags)
+    image = np.asarray(Image.open(tmp_path / "kinetoscope-demo.png"))
+    assert image.shape == (540, 960, 4) and len(np.unique(image.reshape(-1, 4), axis=0)) > 100
+    # A control: with a number of steps, there is no image.
+    (tmp_path / "kinetoscope-demo.png").unlink()
+    assert "50 steps of 4" in demo(*flags, "--steps", "50", folder=tmp_path)[0] and not list(tmp_path.iterdir())
+
+
+def test_demo_in_a_window_and_in_a_browser(tmp_path, display):
+    """Views run in real time: 50 steps of 10 ms take half a second, and less without a view."""
+    assert demo("--headless", "--steps", "50", folder=tmp_path)[1] < 0.4
+    text, seconds = demo("--steps", "50", folder=tmp_path, DISPLAY=display)
+    assert "50 steps of 4 environments" in text and "DISPLAY" not in text and seconds > 0.4
+    text, seconds = demo("--serve", "127.0.0.1:0", "--steps", "50", folder=tmp_path)
+    assert re.search(r"^open http://127\.0\.0\.1:[1-9]\d*/?", text, re.MULTILINE) and seconds > 0.4
+    assert "50 steps of 4 environments" in text and not list(tmp_path.iterdir())

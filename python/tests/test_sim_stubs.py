@@ -22,13 +22,11 @@ def run(*command):
 
 @pytest.fixture
 def strict(tmp_path):
-    """The layers for scripts of other simulators take tensors and arrays of any kind: they are not checked. Libraries of
-    reinforcement learning and of devices may be missing, and their classes have types or not."""
+    """Libraries of reinforcement learning and of devices may be missing, and their classes have types or not."""
     file = tmp_path / "mypy.ini"
     libraries = ["stable_baselines3", "rsl_rl", "tensordict", "skrl", "torch", "torchrl", "ray", "warp", "mujoco_warp", "mujoco"]
     sections = {
         "mypy": "strict = true",
-        "mypy-kinetoscope.compat.*": "ignore_errors = true",
         "mypy-kinetoscope.rl.*": "disallow_subclassing_any = false\ndisallow_untyped_calls = false",
         # Kernels of Warp are functions with a decorator.
         "mypy-kinetoscope.warp.*": "disallow_untyped_decorators = false",
@@ -95,6 +93,50 @@ def test_types_of_a_program(strict, tmp_path):
         "sim.record('run.npz', ['all'])",
         "ks.SimulationManager.from_scene(True)",
         "text: str = sim.screenshot()",
+    ]
+    program.write_text(program.read_text() + "\n".join(mistakes) + "\n")
+    result = run("mypy", "--config-file", strict, str(program))
+    assert result.stdout.count(": error:") == len(mistakes), result.stdout
+
+
+def test_types_of_programs_for_other_simulators(strict, tmp_path):
+    """Configurations of the layers have the types of dataclasses, and handles those of this package."""
+    program = tmp_path / "program.py"
+    program.write_text(
+        "from kinetoscope.compat.configclass import configclass\n"
+        "from kinetoscope.compat.embodichain.lab.sim import SimulationManager, SimulationManagerCfg\n"
+        "from kinetoscope.compat.embodichain.lab.sim.cfg import JointDrivePropertiesCfg, RobotCfg\n"
+        "from kinetoscope.compat.embodichain.lab.sim.sensors import Camera, CameraCfg\n"
+        "from kinetoscope.compat.isaaclab import sensors\n"
+        "from kinetoscope.compat.isaaclab.app import AppLauncher\n"
+        "from kinetoscope.compat.isaaclab.scene import InteractiveScene, InteractiveSceneCfg\n"
+        "sim = SimulationManager(SimulationManagerCfg(num_envs=2, sim_device='cpu'))\n"
+        "robot = sim.add_robot(RobotCfg(fpath='x', drive_pros=JointDrivePropertiesCfg(stiffness=1.0)))\n"
+        "names: list[str] = robot.joint_names\n"
+        "dof: int = robot.native.dof\n"
+        "camera: Camera = sim.add_sensor(CameraCfg(width=8, extrinsics=CameraCfg.ExtrinsicsCfg(pos=(1, 2, 3))))\n"
+        "@configclass\n"
+        "class Cfg(InteractiveSceneCfg):\n"
+        "    camera = sensors.CameraCfg(offset=sensors.CameraCfg.OffsetCfg(convention='ros'))\n"
+        "scene = InteractiveScene(Cfg(num_envs=2, env_spacing=1.0))\n"
+        "app = AppLauncher(headless=True).app\n"
+    )
+    result = run("mypy", "--config-file", strict, str(program))
+    assert result.returncode == 0, result.stdout
+    # Controls: each of these mistakes is found.
+    mistakes = [
+        "RobotCfg(fix_bsae=True)",
+        "SimulationManagerCfg(num_envs='2')",
+        "CameraCfg.ExtrinsicsCfg(position=(1, 2, 3))",
+        "sim.add_robot(CameraCfg())",
+        "sim.update(stpes=3)",
+        "robot.native.qops",
+        "robot.set_joint_drive(drive_type='torque')",
+        "sensors.CameraCfg.OffsetCfg(convention='rso')",
+        "Cfg(num_env=2)",
+        "AppLauncher(3)",
+        "app.running()",
+        "text: str = robot.joint_names",
     ]
     program.write_text(program.read_text() + "\n".join(mistakes) + "\n")
     result = run("mypy", "--config-file", strict, str(program))

@@ -20,6 +20,9 @@ const PREFIX: &str = "kinetoscope_render-";
 const WHEEL: &str = ".whl";
 const SDIST: &str = ".tar.gz";
 
+/// Tag of the wheels: Python 3.10 and later, by the feature of PyO3.
+const ABI: &str = "cp310-abi3";
+
 /// The program that builds wheels from Rust.
 const MATURIN: &str = "maturin==1.16.0";
 
@@ -52,6 +55,9 @@ const TESTED: [(&str, &str); 3] = [("2.3.7", "numpy<2"), ("3.3.7", "numpy>=2"), 
 
 #[derive(Debug, clap::Args)]
 pub(crate) struct WheelArgs {
+    /// Also install the wheels with their requirements into a new virtual environment, as users do, and test them there
+    #[arg(long)]
+    install: bool,
     /// Also install the source distribution into a new virtual environment, which compiles it, and render with it
     #[arg(long)]
     install_sdist: bool,
@@ -65,16 +71,21 @@ pub(crate) struct WheelArgs {
 ///
 /// # Errors
 /// Python cannot be set up, a package does not compile, or a wheel contains paths of this machine or, if it is
-/// portable, symbols of a newer glibc.
+/// portable, symbols of a newer glibc. With `--install`: `pip` cannot install the wheels, or a test of them fails.
 pub(crate) fn run(repo: &Repo, args: &WheelArgs) -> XtaskResult {
     let profile = if args.portable { BuildProfile::Portable } else { BuildProfile::Release };
+    let mut wheels = Vec::new();
     for build in [build, python_simulation::build] {
         let wheel = build(repo, profile)?;
         check(repo, &wheel, profile)?;
         println!("{}", wheel.display());
+        wheels.push(wheel);
     }
     let sdist = source_distribution(repo)?;
     println!("{}", sdist.display());
+    if args.install {
+        python_simulation::install_as_users_do(repo, &wheels)?;
+    }
     if args.install_sdist { install_sdist(repo, &sdist) } else { Ok(()) }
 }
 
@@ -155,7 +166,7 @@ pub(crate) fn build(repo: &Repo, profile: BuildProfile) -> XtaskResult<PathBuf> 
     remove_wheels(&dir, PREFIX)?;
     let build = Cmd::new(maturin(repo)?).arg("build").env("CARGO_TARGET_DIR", &repo.target);
     profile.configure(repo, build)?.arg("--out").arg(&dir).current_dir(repo.root.join(PACKAGE)).run()?;
-    built_wheel(&dir, PREFIX)
+    built_wheel(&dir, PREFIX, ABI)
 }
 
 /// Cargo profile of a wheel.
@@ -229,13 +240,18 @@ fn check(repo: &Repo, wheel: &Path, profile: BuildProfile) -> XtaskResult {
     if profile == BuildProfile::Portable { check.args(["--glibc", GLIBC]) } else { check }.run()
 }
 
-/// The wheel whose name begins with `prefix`.
+/// The wheel whose name begins with `prefix`, for the versions of Python in the tag `abi`, such as `cp311-abi3`.
 ///
 /// # Errors
-/// There is no such wheel.
-pub(crate) fn built_wheel(dir: &Path, prefix: &str) -> XtaskResult<PathBuf> {
+/// There is no such wheel, or it has another tag: only the Python that built it would load it.
+pub(crate) fn built_wheel(dir: &Path, prefix: &str, abi: &str) -> XtaskResult<PathBuf> {
     let message = || Failure::new(format!("maturin built no wheel in {}", dir.display()));
-    built_files(dir, prefix, WHEEL).into_iter().next().ok_or_else(message)
+    let wheel = built_files(dir, prefix, WHEEL).into_iter().next().ok_or_else(message)?;
+    let name = wheel.file_name().unwrap_or_default().to_string_lossy();
+    if name.contains(&format!("-{abi}-")) {
+        return Ok(wheel);
+    }
+    Err(Failure::new(format!("{name}: the tag is not {abi}, which the feature abi3-py3.. of pyo3 in Cargo.toml gives")))
 }
 
 /// Removes wheels of earlier builds whose names begin with `prefix`.
@@ -302,12 +318,18 @@ fn environment(repo: &Repo, version: &str, numpy: &str) -> XtaskResult<PathBuf> 
     if is_ready() { Ok(python) } else { Err(Failure::new(format!("mujoco {version} cannot be imported"))) }
 }
 
-/// Creates a virtual environment with these packages.
+/// Creates a virtual environment with these packages, in place of an earlier one.
 pub(crate) fn create(venv: &Path, packages: &[&str]) -> XtaskResult {
+    let python = create_empty(venv)?;
+    python::pip_install(&python, packages)
+}
+
+/// Creates a virtual environment without packages, in place of an earlier one, and returns its Python.
+pub(crate) fn create_empty(venv: &Path) -> XtaskResult<PathBuf> {
     setup::try_to_have(Requirement::Pip);
     setup::try_to_have(Requirement::Venv);
     Cmd::new("python3").args(["-m", "venv", "--clear"]).arg(venv).run()?;
-    python::pip_install(&venv.join("bin/python"), packages)
+    Ok(venv.join("bin/python"))
 }
 
 #[cfg(test)]
@@ -323,6 +345,23 @@ mod tests {
         assert_eq!(built_files(dir.path(), PREFIX, WHEEL), [dir.path().join("kinetoscope_render-1.whl")]);
         assert_eq!(built_files(dir.path(), PREFIX, SDIST), [dir.path().join("kinetoscope_render-0.1.0.tar.gz")]);
         assert!(built_files(&dir.path().join("missing"), PREFIX, WHEEL).is_empty());
+    }
+
+    #[test]
+    fn wheels_for_several_versions_of_python() {
+        let dir = tempfile::tempdir().expect("a scratch folder");
+        let found = || built_wheel(dir.path(), PREFIX, ABI).map_err(|failure| failure.message);
+        assert!(found().expect_err("an empty folder").starts_with("maturin built no wheel"));
+        let tags = [("cp311-cp311", false), ("cp311-abi3", false), ("py3-none", false), ("cp310-abi3", true)];
+        for (tag, is_right) in tags {
+            let wheel = dir.path().join(format!("kinetoscope_render-0.1.0-{tag}-linux_x86_64.whl"));
+            wheel::tests::write(&wheel, "");
+            match found() {
+                Ok(path) => assert!(is_right && path == wheel, "{tag}"),
+                Err(message) => assert!(!is_right && message.contains(tag) && message.contains(ABI), "{message}"),
+            }
+            std::fs::remove_file(&wheel).expect("removable");
+        }
     }
 
     #[test]

@@ -2,9 +2,9 @@
 //! environment of its own.
 
 use crate::python;
-use crate::python_package::{self, BuildProfile, built_wheel, create, maturin, remove_wheels, wheels};
+use crate::python_package::{self, BuildProfile, built_wheel, create, create_empty, maturin, remove_wheels, wheels};
 use crate::robots;
-use crate::run::{Cmd, Failure, Repo, XtaskResult};
+use crate::run::{Cmd, Failure, Repo, XtaskResult, in_ci};
 use crate::setup::{self, MujocoVersion, Prepared, Requirement, Requirements};
 use crate::{test, wheel};
 use std::path::{Path, PathBuf};
@@ -15,6 +15,9 @@ const PACKAGE: &str = "python/sim";
 
 /// Beginning of the names of its wheels.
 const PREFIX: &str = "kinetoscope-";
+
+/// Tag of the wheels: Python 3.11 and later, by the feature of PyO3.
+const ABI: &str = "cp311-abi3";
 
 /// Robots and meshes for the wheel: a copy of the folder `assets` while it is built.
 const ASSETS: &str = "python/sim/kinetoscope/assets";
@@ -63,6 +66,9 @@ const LEARNING: [&str; 11] = [
 const WARP: [&str; 7] =
     ["mujoco-warp==4.0.0", "warp-lang==1.19.0", "absl-py", "etils", "fsspec", "typing_extensions", "zipp"];
 
+/// Tests of the wheels for users, which need no package but pytest and no feature of CI's wheels.
+const USER_TESTS: [&str; 3] = ["test_sim_core.py", "test_sim_rust.py", "test_sim_wheel.py"];
+
 /// Builds the wheel and returns its path.
 ///
 /// # Errors
@@ -81,7 +87,7 @@ pub(crate) fn build(repo: &Repo, profile: BuildProfile) -> XtaskResult<PathBuf> 
     let built = build.arg("--out").arg(&dir).current_dir(repo.root.join(PACKAGE)).run();
     remove().map_err(fail)?;
     built?;
-    built_wheel(&dir, PREFIX)
+    built_wheel(&dir, PREFIX, ABI)
 }
 
 /// The stage `python-sim` of CI: builds the wheel and that of the renderer, installs both in an environment, and runs the
@@ -93,9 +99,7 @@ pub(crate) fn test(repo: &Repo) -> XtaskResult {
     let ready = prepare(repo)?;
     setup::try_to_have(Requirement::Xvfb);
     let wheels = [python_package::build(repo, BuildProfile::Test)?, build(repo, BuildProfile::Test)?];
-    // The judge of the test that compares with Rust.
-    let all = ["--workspace"];
-    ready.cargo().arg("build").args(all).args(test::features(&all)).args(["--bin", "kinetoscope"]).run()?;
+    build_command(&ready)?;
     for numpy in NUMPY {
         let python = environment(repo, numpy)?;
         install(&python, &wheels)?;
@@ -104,6 +108,12 @@ pub(crate) fn test(repo: &Repo) -> XtaskResult {
             .map_err(|failure| Failure::new(format!("NumPy {numpy}: {}", failure.message)))?;
     }
     Ok(())
+}
+
+/// Builds the command `kinetoscope`, the judge of the tests that compare with Rust.
+fn build_command(ready: &Prepared) -> XtaskResult {
+    let all = ["--workspace"];
+    ready.cargo().arg("build").args(all).args(test::features(&all)).args(["--bin", "kinetoscope"]).run()
 }
 
 /// Runs the tests in an environment with the installed wheels.
@@ -170,6 +180,33 @@ fn has_learning(python: &Path) -> bool {
     Cmd::new(python).args(["-c", imports]).quiet().succeeds()
 }
 
+/// Installs the wheels of both packages into a new virtual environment as users do: pip gets their requirements from the
+/// package index. Then runs the demo with these packages alone, and [`USER_TESTS`].
+///
+/// # Errors
+/// A step fails.
+pub(crate) fn install_as_users_do(repo: &Repo, wheels: &[PathBuf]) -> XtaskResult {
+    let python = create_empty(&repo.target.join("wheel-venv"))?;
+    let pip = || Cmd::new(&python).args(["-m", "pip", "--no-input", "--disable-pip-version-check"]);
+    pip().arg("install").args(wheels).run()?;
+    pip().arg("check").run()?;
+    // Outside of the sources.
+    let folder = repo.target.join("wheel-venv/demo");
+    fs::create_dir_all(&folder).map_err(|e| Failure::new(format!("{}: {e}", folder.display())))?;
+    let demo = ["-m", "kinetoscope", "demo", "--headless", "--steps", "50", "--out", "demo.png"];
+    Cmd::new(&python).args(demo).current_dir(&folder).run()?;
+    let ready = prepare(repo)?;
+    build_command(&ready)?;
+    python::pip_install(&python, &["pytest==9.2.0"])?;
+    Cmd::new(&python)
+        .args(["-m", "pytest", "-q", "-p", "no:cacheprovider"])
+        .args(USER_TESTS)
+        .current_dir(repo.root.join("python/tests"))
+        .env("KINETOSCOPE_CLI", ready.binary("kinetoscope"))
+        .env("PYTHONDONTWRITEBYTECODE", "1")
+        .run()
+}
+
 /// A Python with the wheels for users, for benchmarks, below the target folder.
 ///
 /// # Errors
@@ -195,7 +232,8 @@ fn prepare(repo: &Repo) -> XtaskResult<Prepared> {
     setup::prepare(repo, Requirements { version: Some(MujocoVersion::Wheel), extras: &[] })
 }
 
-/// The environment of the tests with a version of NumPy, below the target folder.
+/// The environment of the tests with a version of NumPy, below the target folder. CI makes a new one, a developer's machine
+/// keeps it.
 fn environment(repo: &Repo, numpy: &str) -> XtaskResult<PathBuf> {
     let venv = repo.target.join(format!("python-sim-numpy-{numpy}"));
     let python = venv.join("bin/python");
@@ -203,7 +241,8 @@ fn environment(repo: &Repo, numpy: &str) -> XtaskResult<PathBuf> {
         "import cv2, gymnasium, matplotlib, mypy, numpy, pytest, ray, scipy, PIL; assert numpy.__version__ == '{numpy}'"
     );
     let is_ready = || Cmd::new(&python).args(["-c", &check]).quiet().succeeds();
-    if !is_ready() {
+    // An environment of earlier tests could have packages that the wheels do not require.
+    if in_ci() || !is_ready() {
         let core = format!("mujoco-core=={}", wheel::VERSION);
         create(&venv, &[&[core.as_str(), &format!("numpy=={numpy}")][..], &PACKAGES].concat())?;
     }
@@ -254,5 +293,16 @@ mod tests {
         fs::write(from.join("a/b/c.stl"), "solid").expect("writable");
         copy(&from, &to).expect("copied");
         assert_eq!(fs::read_to_string(to.join("a/b/c.stl")).expect("a file"), "solid");
+    }
+    #[test]
+    fn tests_for_users_need_no_other_package() {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../python/tests");
+        for file in USER_TESTS {
+            let text = fs::read_to_string(folder.join(file)).expect("a file of tests");
+            for name in ["cv2", "gymnasium", "matplotlib", "mypy", "ray", "scipy", "PIL", "_panic_next"] {
+                let uses = [format!("import {name}"), format!("from {name}"), format!("_sim.{name}")];
+                assert!(uses.iter().all(|used| !text.contains(used.as_str())), "{file}: {name}");
+            }
+        }
     }
 }

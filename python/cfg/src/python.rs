@@ -162,6 +162,10 @@ impl Context {
     /// Classes and literal types of a module, and their names.
     fn items(&self, root: &Path, module: &str) -> Result<(String, BTreeSet<String>), String> {
         let (mut text, mut names) = (String::new(), BTreeSet::new());
+        if module == SCENES {
+            text.push_str(&self.entities());
+            names.insert(ENTITY.to_string());
+        }
         let located = |name: &str, error: String| format!("{name}: {error}");
         for known in ENUMS.iter().filter(|known| area(known.file) == module) {
             let (doc, mut variants) = find_enum(&parse(root, known.file)?, known.name)
@@ -184,6 +188,7 @@ impl Context {
         for known in self.structs.iter().filter(|known| area(known.file) == module) {
             let (doc, mut fields) = find_struct(&parse(root, known.file)?, known.name)
                 .ok_or_else(|| format!("{}: no struct {}", known.file, known.name))?;
+            let doc = if known.names_in_files.is_empty() { doc } else { in_files(known, &doc, &mut fields)? };
             let doc = self.doc(&doc).map_err(|error| located(known.class, error))?;
             self.translate(&mut fields).map_err(|error| located(known.class, error))?;
             text.push_str(&self.class(known, &doc, &fields));
@@ -207,6 +212,16 @@ impl Context {
     /// Notes a name of another module.
     fn note(&self, name: &str) {
         self.used.borrow_mut().insert(name.into());
+    }
+
+    /// The type of the configurations of entities.
+    fn entities(&self) -> String {
+        let mut classes: Vec<&str> =
+            self.structs.iter().filter(|known| known.entity.is_some()).map(|known| known.class).collect();
+        classes.sort_unstable();
+        classes.iter().for_each(|class| self.note(class));
+        let doc = docstring("Configuration of an entity of a scene.", 0);
+        format!("\n{ENTITY}: TypeAlias = (\n    {}\n)\n{doc}", classes.join("\n    | "))
     }
 
     /// A literal type, or a class of constructors.
@@ -404,6 +419,12 @@ impl Context {
             "Table" => "Mapping[str, Any]".into(),
             // A class of the extension module.
             "Array2" | "Topic" => "Any".into(),
+            ENTITY => {
+                self.note(ENTITY);
+                format!("{ENTITY} | Mapping[str, Any]")
+            }
+            // A pair in place of a table.
+            "ExclusionCfg" => "ExclusionCfg | Mapping[str, Any] | Sequence[str]".into(),
             // A path in place of a table.
             "UrdfCfg" | "MjcfFile" => {
                 self.note(&name);
@@ -427,6 +448,30 @@ impl Context {
     fn is_plain(&self, name: &str) -> bool {
         PLAIN.contains(&name)
     }
+}
+
+/// The module of scenes, and its type of the configurations of entities.
+const SCENES: &str = "scenes";
+const ENTITY: &str = "EntityCfg";
+
+/// Gives the fields of a struct that serde does not read their names in files, and removes those that files do not have. Returns the
+/// first paragraph of the documentation: the others describe constructors of Rust.
+fn in_files(known: &Struct, doc: &str, fields: &mut Vec<Field>) -> Result<String, String> {
+    let mut named = Vec::new();
+    for mut field in fields.drain(..) {
+        let name = known.names_in_files.iter().find(|(name, _)| *name == field.name);
+        match name {
+            Some((_, None)) => {}
+            Some((_, Some(name))) => {
+                field.optional = known.default.contains_key(*name);
+                field.name = (*name).to_string();
+                named.push(field);
+            }
+            None => return Err(format!("{}: name the field {} in files, in types.rs", known.name, field.name)),
+        }
+    }
+    *fields = named;
+    Ok(doc.split("\n\n").next().unwrap_or_default().to_string())
 }
 
 /// Enumerations without content in any variant, whose names are literal types.

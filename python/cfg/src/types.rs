@@ -26,6 +26,9 @@ pub(crate) struct Struct {
     pub(crate) default: Table,
     /// Names and values of other constructors.
     pub(crate) presets: Vec<(&'static str, Table)>,
+    /// For structs that a reader of files fills in instead of serde: names of fields in Rust and in files; `None` for fields that
+    /// files do not have.
+    pub(crate) names_in_files: Vec<(&'static str, Option<&'static str>)>,
 }
 
 /// An enumeration, which becomes a class of constructors, or a literal type if no variant has fields.
@@ -56,7 +59,7 @@ pub(crate) enum Declared {
 }
 
 /// The modules of the package `cfg`, and the items of each in words. A module uses those before it.
-pub(crate) const AREAS: [(&str, &str); 13] = [
+pub(crate) const AREAS: [(&str, &str); 14] = [
     ("shapes", "shapes, surfaces and collision geometry"),
     ("simulation", "simulations, the ground, lights and shards"),
     ("robots", "robots, articulations, their files and drives"),
@@ -66,6 +69,7 @@ pub(crate) const AREAS: [(&str, &str); 13] = [
     ("rendering", "renderers, lenses, apertures and shutters"),
     ("cameras", "cameras and their imperfections"),
     ("sensors", "sensors other than cameras"),
+    ("scenes", "declared scenes"),
     ("randomization", "random properties of environments"),
     ("tasks", "tasks for learning agents"),
     ("views", "windows, browser views and screenshots"),
@@ -74,7 +78,7 @@ pub(crate) const AREAS: [(&str, &str); 13] = [
 
 /// The module of a type, by the source file of the type.
 pub(crate) fn area(file: &str) -> &'static str {
-    const PREFIXES: [(&str, &str); 17] = [
+    const PREFIXES: [(&str, &str); 18] = [
         ("scene/src/mesh/", "shapes"),
         ("sim/src/surface_cfg.rs", "shapes"),
         ("sim/src/objects/shape.rs", "shapes"),
@@ -86,6 +90,7 @@ pub(crate) fn area(file: &str) -> &'static str {
         ("sim/src/objects/articulation.rs", "robots"),
         ("sim/src/objects/mjcf_file.rs", "robots"),
         ("sim/src/inspect/", "robots"),
+        ("sim/src/interactive_scene/", "scenes"),
         ("sim/src/randomization/", "randomization"),
         ("sim/src/objects/", "objects"),
         ("scene/src/terrain/", "objects"),
@@ -121,6 +126,7 @@ macro_rules! structs {
             entity: [$($entity,)? ""].first().copied().filter(|kind: &&str| !kind.is_empty()),
             default: table(&$default),
             presets: Vec::new(),
+            names_in_files: Vec::new(),
         },)*]
     };
 }
@@ -227,6 +233,34 @@ pub(crate) fn structs() -> Vec<Struct> {
         "record/src/cfg.rs" RecorderCfg = new::<record::RecorderCfg>(), RecorderCfg;
         "record/src/live.rs" FoxgloveCfg = new::<record::FoxgloveCfg>(), FoxgloveCfg;
     };
+    let scenes = [
+        (
+            "sim/src/interactive_scene/exclusion.rs",
+            "ExclusionCfg",
+            Table::new(),
+            vec![("pair", Some("pair")), ("at", None)],
+        ),
+        (
+            "sim/src/interactive_scene/mod.rs",
+            "SceneCfg",
+            empty_scene(),
+            vec![
+                ("simulation", Some("simulation")),
+                ("entities", Some("entities")),
+                ("exclusions", Some("exclude_collisions")),
+                ("sources", None),
+            ],
+        ),
+    ];
+    all.extend(scenes.map(|(file, name, default, names_in_files)| Struct {
+        file,
+        name,
+        class: name,
+        entity: None,
+        default,
+        presets: Vec::new(),
+        names_in_files,
+    }));
     // The tile of a share is required.
     all.iter_mut().filter(|known| known.class == "TileShare").for_each(|share| drop(share.default.remove("tile")));
     if let Some(simulation) = all.iter_mut().find(|known| known.class == "SimulationManagerCfg") {
@@ -236,6 +270,16 @@ pub(crate) fn structs() -> Vec<Struct> {
         ];
     }
     all
+}
+
+/// The scene that an empty file declares.
+fn empty_scene() -> Table {
+    let simulation = table(&sim::SimulationManagerCfg::default());
+    Table::from_iter([
+        ("simulation".to_string(), Value::Table(simulation)),
+        ("entities".to_string(), Value::Table(Table::new())),
+        ("exclude_collisions".to_string(), Value::Array(Vec::new())),
+    ])
 }
 
 /// A term whose fields are all required.

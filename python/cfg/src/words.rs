@@ -170,7 +170,7 @@ fn name(code: &str, is_literal: &impl Fn(&str) -> Option<bool>) -> Result<String
         return Ok(format!("``{item}``"));
     }
     let class = owner.strip_suffix("Mut").unwrap_or(owner);
-    if class.ends_with("Cfg") || ["Robot", "RigidObject", "Extrinsics"].contains(&class) {
+    if class.ends_with("Cfg") || ["Robot", "RigidObject", "Extrinsics", "SimulationManager"].contains(&class) {
         return Ok(format!("``{class}.{item}``"));
     }
     Err(format!("`{code}` has no counterpart in Python; add it to python/cfg/src/words.rs"))

@@ -8,6 +8,10 @@ import time
 
 import kinetoscope as ks
 
+# Steps and image of a demo that nothing shows: its user gave no number of steps, and there is no display.
+UNSEEN_STEPS = 2000
+UNSEEN_IMAGE = "kinetoscope-demo.png"
+
 
 def demo(arguments: argparse.Namespace) -> None:
     """Waves the bundled arm with a hand in several environments."""
@@ -23,16 +27,23 @@ def demo(arguments: argparse.Namespace) -> None:
     window = server = None
     if arguments.serve is not None:
         server = sim.serve(arguments.serve, speed=1.0)
-        print(f"open {server.url}")
+        print(f"open {server.url}", flush=True)
     elif not arguments.headless:
         try:
             window = sim.open_window("kinetoscope demo")
         except ks.ViewerError as error:
             print(error)
+    limit, image = arguments.steps, arguments.out
+    if limit is None:
+        # A window or a browser view ends the demo.
+        limit = math.inf
+        if window is None and server is None:
+            limit, image = UNSEEN_STEPS, image or UNSEEN_IMAGE
+            print(f"without a window: {limit} steps, then an image; --serve shows the arm in a browser, --steps N takes N steps")
     joints = arm.joint_ids("arm")
     started, steps = time.perf_counter(), 0
     try:
-        while steps < arguments.steps and (window is None or window.is_open):
+        while steps < limit and (window is None or window.is_open):
             phase = 2 * math.pi * steps / 400
             targets = [0.6 * math.sin(phase), 0.4 + 0.3 * math.cos(phase), -1.4, 0.0, -0.6, phase % (2 * math.pi) - math.pi]
             arm.set_qpos_target(targets, joint_ids=joints)
@@ -43,9 +54,9 @@ def demo(arguments: argparse.Namespace) -> None:
     seconds = time.perf_counter() - started
     depth = camera["depth"]
     print(f"{steps} steps of {sim.num_envs} environments in {seconds:.2f} s; depth {depth.min():.2f} to {depth.max():.2f} m")
-    if arguments.out is not None:
-        sim.screenshot(arguments.out)
-        print(f"wrote {arguments.out}")
+    if image is not None:
+        sim.screenshot(image)
+        print(f"wrote {image}")
     sim.destroy()
 
 
@@ -55,11 +66,13 @@ def main() -> None:
     parser.add_argument("--version", action="version", version=f"kinetoscope {ks.__version__}, MuJoCo {ks.mujoco_version()}")
     commands = parser.add_subparsers(required=True)
     command = commands.add_parser("demo", help="an arm that moves in several environments")
+    steps = f"number of physics steps; without it, until Ctrl+C or the end of the window, or {UNSEEN_STEPS} without a window"
     command.add_argument("--num-envs", type=int, default=4, help="number of environments")
-    command.add_argument("--steps", type=int, default=1_000_000, help="number of physics steps")
+    command.add_argument("--steps", type=int, help=steps)
     command.add_argument("--headless", action="store_true", help="no window")
     command.add_argument("--serve", nargs="?", const="127.0.0.1:8080", metavar="ADDRESS", help="browser view")
-    command.add_argument("--out", metavar="FILE.png", help="write an image at the end")
+    image = f"write an image at the end; {UNSEEN_IMAGE} without a window and --steps"
+    command.add_argument("--out", metavar="FILE.png", help=image)
     command.set_defaults(run=demo)
     arguments = parser.parse_args()
     arguments.run(arguments)

@@ -48,6 +48,7 @@ from .cfg import (
     RigidObjectCfg,
     RigidObjectGroupCfg,
     RobotCfg,
+    SceneCfg,
     ScreenshotCfg,
     SegmentationCfg,
     ServeCfg,
@@ -151,8 +152,10 @@ def recover(path: str | os.PathLike[str], to: str | os.PathLike[str] | None = No
     """
 def mujoco_version() -> str:
     """Version of the MuJoCo library that is loaded."""
-def to_toml(scene: _Fields) -> str:
-    """Text of a scene file: the scene as Rust reads it, with all fields."""
+def to_toml(scene: SceneCfg | _Fields) -> str:
+    """Text of a scene file: the scene as Rust reads it, with all fields. ``scene`` is a ``SceneCfg``, or a dict of
+    its fields.
+    """
 def read_calibration(path: str | os.PathLike[str]) -> dict[str, Any]:
     """Fields of a ``CameraCfg`` from a calibration file of ROS: width, height, intrinsics, lens, and a renderer that
     supports the lens, for ``CameraCfg(**read_calibration("wrist.yaml"))``.
@@ -420,10 +423,8 @@ class SimulationManager:
     def from_file(cls, path: str | os.PathLike[str], **fields: Any) -> Self:
         """Builds the scene of a scene file (TOML or YAML). Keyword arguments replace fields of ``[simulation]``."""
     @classmethod
-    def from_scene(cls, scene: _Fields) -> Self:
-        """Builds a scene from a dict in the form of scene files: ``simulation``, ``entities`` by name
-        (configurations, or dicts with a ``type``), ``exclude_collisions``.
-        """
+    def from_scene(cls, scene: SceneCfg | _Fields) -> Self:
+        """Builds a scene from a ``SceneCfg``, or a dict of its fields. An entity may be a dict with a ``type``."""
     def keys(self, /) -> list[str]:
         """Names of the entities, in the order in which they were added."""
     def nominal_property(self, /, property: Property, name: str) -> list[float]:

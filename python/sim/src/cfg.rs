@@ -21,6 +21,10 @@ pub(crate) const NONE_IS_FALSE: [&str; 3] = ["ground", "min_thickness", "speed"]
 
 /// Type of the configuration of a simulation, for [`table`].
 pub(crate) const SIMULATION: &str = "simulation";
+/// Type of the configuration of a scene, for [`table`].
+const SCENE: &str = "SceneCfg";
+/// Key of the collision exclusions of a scene.
+const EXCLUSIONS: &str = "exclude_collisions";
 /// Type of a configuration that is part of another, or that is not known, for [`table`].
 pub(crate) const ANY: &str = "";
 
@@ -280,14 +284,18 @@ pub(crate) fn changed_simulation(
     simulation(fields)
 }
 
-/// Table of a scene from a dict: entities may be configurations with a type, whose `uid` is replaced by the name.
+/// Table of a scene from a `SceneCfg` or a dict: entities may be configurations with a type, whose `uid` is replaced by the
+/// name, and collision exclusions may be pairs or `ExclusionCfg`.
 pub(crate) fn scene_table(scene: &Bound<'_, PyAny>) -> PyResult<Table> {
-    let mut document = table(ANY, Some(scene), None)?;
-    if let Ok(simulation) = scene.get_item(SIMULATION) {
+    let mut document = table(SCENE, Some(scene), None)?;
+    let part = |name: &str| match scene.cast::<PyMapping>() {
+        Ok(scene) => scene.get_item(name).ok(),
+        Err(_) => scene.getattr(name).ok(),
+    };
+    if let Some(simulation) = part(SIMULATION) {
         refuse(scene.py(), "mistake", (SIMULATION, simulation))?;
     }
-    let entities = scene.get_item("entities").ok();
-    if let (Some(Value::Table(converted)), Some(entities)) = (document.get_mut("entities"), entities) {
+    if let (Some(Value::Table(converted)), Some(entities)) = (document.get_mut("entities"), part("entities")) {
         for item in entities.cast::<PyMapping>()?.items()?.iter() {
             let (name, entity): (String, Bound<'_, PyAny>) = item.extract()?;
             let Some(Value::Table(fields)) = converted.get_mut(&name) else { continue };
@@ -297,6 +305,20 @@ pub(crate) fn scene_table(scene: &Bound<'_, PyAny>) -> PyResult<Table> {
             }
             if entity.cast::<PyMapping>().is_err() {
                 fields.remove("uid");
+            }
+        }
+    }
+    if let Some(Value::Array(exclusions)) = document.get_mut(EXCLUSIONS) {
+        for (index, exclusion) in exclusions.iter_mut().enumerate() {
+            let path = format!("{EXCLUSIONS}[{index}]");
+            if let Value::Table(fields) = exclusion {
+                if let Some(name) = fields.keys().find(|name| *name != "pair") {
+                    return Err(invalid(&path, &format!("unknown field `{name}`, expected `pair`")));
+                }
+                *exclusion = fields.remove("pair").ok_or_else(|| invalid(&path, "missing field `pair`"))?;
+            }
+            if !matches!(exclusion, Value::Array(names) if names.len() == 2 && names.iter().all(Value::is_str)) {
+                return Err(invalid(&path, &format!("expected two names, not {exclusion}")));
             }
         }
     }

@@ -70,8 +70,7 @@ impl Simulation {
         Self::of_scene(py, scene)
     }
 
-    /// Builds a scene from a dict in the form of scene files: ``simulation``, ``entities`` by name (configurations, or
-    /// dicts with a ``type``), ``exclude_collisions``.
+    /// Builds a scene from a ``SceneCfg``, or a dict of its fields. An entity may be a dict with a ``type``.
     #[classmethod]
     fn from_scene(_class: &Bound<'_, PyType>, py: Python<'_>, scene: &Bound<'_, PyAny>) -> PyResult<Self> {
         let scene = cfg::scene(&cfg::scene_table(scene)?)?;
@@ -690,7 +689,7 @@ fn property_of(name: &str) -> PyResult<Property> {
     })
 }
 
-/// Text of a scene file: the scene as Rust reads it, with all fields.
+/// Text of a scene file: the scene as Rust reads it, with all fields. ``scene`` is a ``SceneCfg``, or a dict of its fields.
 #[pyfunction]
 pub(crate) fn to_toml(scene: &Bound<'_, PyAny>) -> PyResult<String> {
     let scene = cfg::scene(&cfg::scene_table(scene)?)?;

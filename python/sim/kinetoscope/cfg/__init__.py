@@ -94,6 +94,7 @@ from .robots import (
     UrdfCfg,
 )
 from .sampling import NoiseCfg, SamplingCfg
+from .scenes import EntityCfg, ExclusionCfg, SceneCfg
 from .sensors import (
     ActuatorStateCfg,
     BpearlPattern,
@@ -144,9 +145,11 @@ __all__ = [
     "DriveCfg",
     "DriveModel",
     "DriveType",
+    "EntityCfg",
     "EnvSelection",
     "EquidistantLens",
     "EquisolidLens",
+    "ExclusionCfg",
     "Exposure",
     "Extrinsics",
     "FThetaLens",
@@ -216,6 +219,7 @@ __all__ = [
     "RoughTerrain",
     "RoughTile",
     "SamplingCfg",
+    "SceneCfg",
     "ScreenshotCfg",
     "SegmentationCfg",
     "ServeCfg",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import os
 from typing import Any
 
@@ -9,13 +10,14 @@ import numpy as np
 
 from . import numpy_torch
 
-try:
-    # The variable selects NumPy although torch is installed.
-    if os.environ.get("KINETOSCOPE_COMPAT_TORCH") == "0":
-        raise ImportError
-    import torch
-except ImportError:
-    torch = None  # type: ignore[assignment]
+# The module, or None: torch is no requirement of this package, whose types do not depend on it.
+torch: Any = None
+# The variable selects NumPy although torch is installed.
+if os.environ.get("KINETOSCOPE_COMPAT_TORCH") != "0":
+    try:
+        torch = importlib.import_module("torch")
+    except ImportError:
+        pass
 
 
 def tensor(array: Any) -> Any:

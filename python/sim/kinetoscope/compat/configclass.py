@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 import dataclasses
 import inspect
-from typing import Any, TypeVar
+from typing import Any, TypeVar, dataclass_transform
 
 T = TypeVar("T")
 MISSING = dataclasses.MISSING
@@ -31,6 +31,7 @@ def fields_of(cls: type) -> dict[str, Any]:
     return fields
 
 
+@dataclass_transform(kw_only_default=True)
 def configclass(cls: type[T]) -> type[T]:
     """Turns a class into a configuration: class attributes, annotated or not, are fields that each object gets a copy
     of. Objects have ``copy``, ``replace`` and ``to_dict``."""

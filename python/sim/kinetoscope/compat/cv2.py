@@ -7,6 +7,7 @@ into the folder of the environment variable ``KINETOSCOPE_COMPAT_IMAGES``, if it
 
 from __future__ import annotations
 
+import importlib
 import os
 import re
 from pathlib import Path
@@ -16,10 +17,12 @@ import numpy as np
 
 from ..notebook import png
 
+# The module, or None: OpenCV is no requirement of this package, whose types do not depend on it.
+_opencv: Any = None
 try:
-    import cv2 as _opencv
+    _opencv = importlib.import_module("cv2")
 except ImportError:
-    _opencv = None  # type: ignore[assignment]
+    pass
 
 COLOR_BGR2RGB = COLOR_RGB2BGR = 4
 COLOR_GRAY2BGR = COLOR_GRAY2RGB = 8

@@ -9,7 +9,7 @@ work on tensors as on arrays.
 from __future__ import annotations
 
 import warnings
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple, cast
 
 import numpy as np
 
@@ -84,11 +84,11 @@ def _spread(method: str) -> Any:
     return reduce
 
 
-class Tensor(np.ndarray):  # type: ignore[type-arg]
+class Tensor(np.ndarray[Any, np.dtype[Any]]):
     """A NumPy array with methods of a tensor."""
 
     @property
-    def device(self) -> str:
+    def device(self) -> Literal["cpu"]:
         return "cpu"
 
     def cpu(self) -> Tensor:
@@ -107,10 +107,10 @@ class Tensor(np.ndarray):  # type: ignore[type-arg]
                 dtype = target
             else:
                 _check_device(target)
-        return self if dtype is None or self.dtype == dtype else self.astype(dtype)
+        return self if dtype is None or self.dtype == dtype else cast(Tensor, self.astype(dtype))
 
     @property
-    def size(self) -> _Size:  # type: ignore[override]
+    def size(self) -> _Size:  # type: ignore[override, unused-ignore]
         size = _Size(np.asarray(self).size)
         size.shape = self.shape
         return size
@@ -121,7 +121,7 @@ class Tensor(np.ndarray):  # type: ignore[type-arg]
     any, all, argmax, argmin = _along("any"), _along("all"), _along("argmax"), _along("argmin")
     cumsum, argsort = _along("cumsum"), _along("argsort")
 
-    def sort(self, dim: int = -1, descending: Any = False, **numpy: Any) -> Any:  # type: ignore[override]
+    def sort(self, dim: int = -1, descending: Any = False, **numpy: Any) -> Any:  # type: ignore[override, unused-ignore]
         """Sorted values and their indices. With arguments of NumPy's method, that."""
         if numpy:
             return super().sort(**numpy)
@@ -130,13 +130,13 @@ class Tensor(np.ndarray):  # type: ignore[type-arg]
         values = np.take_along_axis(plain, indices, axis=dim)
         return ValuesAndIndices(values.view(Tensor), indices.view(Tensor))
 
-    def transpose(self, *axes: Any) -> Any:  # type: ignore[override]
+    def transpose(self, *axes: Any) -> Any:  # type: ignore[override, unused-ignore]
         """Exchanges two axes. With another number of axes, the method of NumPy."""
         if len(axes) == 2 and all(isinstance(axis, int) for axis in axes):
             return self.swapaxes(*axes)
         return super().transpose(*axes)
 
-    def view(self, *shape: Any) -> Any:  # type: ignore[override]
+    def view(self, *shape: Any) -> Any:  # type: ignore[override, unused-ignore]
         """A tensor of another shape. With a type, the method of NumPy."""
         sizes = shape[0] if len(shape) == 1 and isinstance(shape[0], tuple | list) else shape
         if sizes and all(isinstance(size, int) for size in sizes):
@@ -147,7 +147,7 @@ class Tensor(np.ndarray):  # type: ignore[type-arg]
         raise TypeError("nonzero: torch returns one tensor, NumPy a tuple; use numpy.nonzero(numpy.asarray(t))")
 
     def float(self) -> Tensor:
-        return self.astype(np.float32)
+        return cast(Tensor, self.astype(np.float32))
 
     def numpy(self) -> Any:
         return self.view(_Array)
@@ -156,7 +156,7 @@ class Tensor(np.ndarray):  # type: ignore[type-arg]
         return self.copy()
 
     def unsqueeze(self, axis: int) -> Tensor:
-        return np.expand_dims(self, axis)
+        return cast(Tensor, np.expand_dims(self, axis))
 
     def unsqueeze_(self, axis: int) -> Tensor:
         return self._in_place(np.expand_dims(self, axis).shape)
@@ -171,7 +171,7 @@ class Tensor(np.ndarray):  # type: ignore[type-arg]
             self.shape = shape
         return self
 
-    def repeat(self, *sizes: Any, axis: Any = "tile") -> Any:  # type: ignore[override]
+    def repeat(self, *sizes: Any, axis: Any = "tile") -> Any:  # type: ignore[override, unused-ignore]
         """Tiles the tensor, as ``torch.Tensor.repeat``. With ``axis``, the method of NumPy."""
         if axis != "tile":
             return super().repeat(sizes[0], axis=axis)
@@ -184,7 +184,7 @@ class Tensor(np.ndarray):  # type: ignore[type-arg]
         return np.asarray(array).view(Tensor)
 
 
-class _Array(np.ndarray):  # type: ignore[type-arg]
+class _Array(np.ndarray[Any, np.dtype[Any]]):
     """A NumPy array with the method ``ptp`` that NumPy 2 removed."""
 
     def ptp(self, *arguments: Any, **options: Any) -> Any:
@@ -257,7 +257,7 @@ def rand_like(other: Any) -> Tensor:
 
 
 def randn_like(other: Any) -> Tensor:
-    return _GENERATOR.standard_normal(np.shape(other), dtype=np.float32).view(Tensor)
+    return as_tensor(_GENERATOR.standard_normal(np.shape(other), dtype=np.float32))
 
 
 def max(data: Any) -> Any:  # noqa: A001
@@ -269,11 +269,11 @@ def min(data: Any) -> Any:  # noqa: A001
 
 
 def cat(tensors: Any, dim: int = 0) -> Tensor:
-    return np.concatenate(tensors, axis=dim).view(Tensor)
+    return as_tensor(np.concatenate(tensors, axis=dim))
 
 
 def stack(tensors: Any, dim: int = 0) -> Tensor:
-    return np.stack(tensors, axis=dim).view(Tensor)
+    return as_tensor(np.stack(tensors, axis=dim))
 
 
 def set_printoptions(precision: int | None = None, sci_mode: Any = None, **_: Any) -> None:

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..._sim import Robot
 from ...errors import ConfigError
@@ -291,7 +292,7 @@ class Articulation(RootAsset):
         self.native = native
         self.cfg = cfg
         self.data = ArticulationData(native, origins, cfg)
-        self._pending: dict[str, tuple[Any, Any, Any]] = {}
+        self._pending: dict[str, NDArray[Any]] = {}
 
     @property
     def num_joints(self) -> int:

@@ -5,16 +5,16 @@ from __future__ import annotations
 import logging
 from typing import Any
 
-_LOG = logging.getLogger("kinetoscope.compat.isaaclab")
+LOG = logging.getLogger("kinetoscope.compat.isaaclab")
 
 
 def log_error(message: Any) -> None:
-    _LOG.error("%s", message)
+    LOG.error("%s", message)
 
 
 def log_warn(message: Any) -> None:
-    _LOG.warning("%s", message)
+    LOG.warning("%s", message)
 
 
 def log_info(message: Any) -> None:
-    _LOG.info("%s", message)
+    LOG.info("%s", message)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
 
@@ -34,6 +34,10 @@ __all__ = [
 ]
 
 
+# Axes of cameras.
+Axes: TypeAlias = Literal["ros", "opengl", "world"]
+
+
 @configclass
 class SensorBaseCfg:
     """Fields of all sensors: the path of the sensor, the time between measurements [s], markers."""
@@ -50,7 +54,7 @@ class CameraOffsetCfg:
 
     pos: Any = (0.0, 0.0, 0.0)
     rot: Any = (1.0, 0.0, 0.0, 0.0)
-    convention: str = "ros"
+    convention: Axes = "ros"
 
 
 @configclass
@@ -130,13 +134,17 @@ class FrameTransformerCfg(SensorBaseCfg):
     target_frames: Any = ()
 
 
+# Inside of ImuCfg, the name of the class is that of an attribute.
+_Offset: TypeAlias = OffsetCfg
+
+
 @configclass
 class ImuCfg(SensorBaseCfg):
     """An IMU. Its path is that of a body. ``gravity_bias`` is added to the acceleration, in world axes [m/s²]."""
 
     OffsetCfg = OffsetCfg
 
-    offset: OffsetCfg = OffsetCfg()
+    offset: _Offset = OffsetCfg()
     gravity_bias: Any = (0.0, 0.0, 9.81)
 
 
@@ -190,7 +198,7 @@ class CameraData(Layer):
     def intrinsic_matrices(self) -> Any:
         return tensor(self._sensor.native.intrinsic_matrices)
 
-    def _pose(self, convention: str) -> Any:
+    def _pose(self, convention: Axes) -> Any:
         return to_world(self._sensor.native.pose_w(convention), self._sensor._origins)
 
     @property
@@ -226,7 +234,7 @@ class Camera(_Sensor):
     def image_shape(self) -> tuple[int, int]:
         return self.native.image_shape
 
-    def set_world_poses(self, positions: Any, orientations: Any, env_ids: Any = None, convention: str = "ros") -> None:
+    def set_world_poses(self, positions: Any, orientations: Any, env_ids: Any = None, convention: Axes = "ros") -> None:
         """Places the camera in the world frame, rotations w x y z."""
         positions = np.array(array(positions), dtype=float)
         positions -= self._origins if env_ids is None else self._origins[array(env_ids)]

@@ -108,11 +108,13 @@ class SimulationContext(Layer):
 
     _instance: ClassVar[SimulationContext | None] = None
     wants_window: ClassVar[bool] = False
+    wants_server: ClassVar[bool] = False
 
     def __init__(self, cfg: SimulationCfg | None = None) -> None:
         self.cfg = cfg or SimulationCfg()
         self.native: Any = None
         self.window: Any = None
+        self.server: Any = None
         self.step_count = 0
         self._view: Any = None
         SimulationContext._instance = self
@@ -151,7 +153,8 @@ class SimulationContext(Layer):
             native.set_camera_view(*self._view)
 
     def reset(self) -> None:
-        """Starts the simulation; opens the window of a script that is not headless."""
+        """Starts the simulation; opens the window of a script that is not headless, or the browser view of --livestream, and
+        prints its address. Both run in real time."""
         if self.native is None:
             raise RuntimeError("sim.reset: there is no scene; create an InteractiveScene first")
         if SimulationContext.wants_window and self.window is None:
@@ -159,6 +162,9 @@ class SimulationContext(Layer):
                 self.window = self.native.open_window()
             except ViewerError as error:
                 warnings.warn(f"no window: {error}", stacklevel=2)
+        if SimulationContext.wants_server and self.server is None:
+            self.server = self.native.serve(speed=1.0)
+            print(f"open {self.server.url}", flush=True)
 
     def step(self, render: bool = True) -> None:  # noqa: ARG002
         """One physics step."""

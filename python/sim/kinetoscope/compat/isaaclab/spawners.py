@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -123,12 +123,18 @@ class ConeCfg(ShapeCfg):
     axis: str = "Z"
 
 
-# Shapes with an axis, and the shapes of this package.
-AXIAL = {
-    CylinderCfg: lambda cfg: native.ObjectShape.cylinder(radius=float(cfg.radius), length=float(cfg.height)),
-    CapsuleCfg: lambda cfg: native.ObjectShape.capsule(radius=float(cfg.radius), length=float(cfg.height)),
-    ConeCfg: lambda cfg: native.ObjectShape.cone(radius=float(cfg.radius), height=float(cfg.height)),
-}
+# A shape with an axis.
+AxialCfg: TypeAlias = CylinderCfg | CapsuleCfg | ConeCfg
+
+
+def axial(cfg: AxialCfg) -> dict[str, Any]:
+    """The shape of this package for a shape with an axis."""
+    radius, height = float(cfg.radius), float(cfg.height)
+    if isinstance(cfg, CylinderCfg):
+        return native.ObjectShape.cylinder(radius=radius, length=height)
+    if isinstance(cfg, CapsuleCfg):
+        return native.ObjectShape.capsule(radius=radius, length=height)
+    return native.ObjectShape.cone(radius=radius, height=height)
 
 
 def shape(cfg: Any, owner: str) -> dict[str, Any]:
@@ -137,9 +143,9 @@ def shape(cfg: Any, owner: str) -> dict[str, Any]:
         form = native.ObjectShape.box(size=[float(x) for x in np.asarray(array(cfg.size))])
     elif isinstance(cfg, SphereCfg):
         form = native.ObjectShape.sphere(radius=float(cfg.radius))
-    elif isinstance(cfg, tuple(AXIAL)):
+    elif isinstance(cfg, AxialCfg):
         unsupported(f"{owner}.spawn", axis=cfg.axis.upper() != "Z")
-        form = next(make(cfg) for kind, make in AXIAL.items() if isinstance(cfg, kind))
+        form = axial(cfg)
     else:
         known = "CuboidCfg, SphereCfg, CylinderCfg, CapsuleCfg or ConeCfg"
         raise ConfigError(f"{owner}: spawn is a {type(cfg).__name__}; a rigid object is a {known}")

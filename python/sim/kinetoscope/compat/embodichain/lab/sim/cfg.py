@@ -6,6 +6,7 @@ from typing import Any, Literal
 
 from kinetoscope.compat import unsupported
 from kinetoscope.compat.configclass import configclass
+from kinetoscope.compat.embodichain.lab.visualization import VisualizationCfg
 
 PerJoint = Any
 
@@ -179,4 +180,4 @@ class SimulationManagerCfg:
     sim_device: Any = "cpu"
     physics_config: PhysicsCfg = PhysicsCfg()
     profiler: Any = None
-    visualization: Any = None
+    visualization: VisualizationCfg | None = None

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import warnings
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from kinetoscope.compat import step_limit, unsupported
 from kinetoscope.compat._layer import Layer
 from kinetoscope.compat._poses import to_row
 from kinetoscope.compat._tensors import array, tensor
+from kinetoscope.compat.embodichain.lab.visualization import VisualizationCfg
 from .cfg import (
     ArticulationCfg,
     JointDrivePropertiesCfg,
@@ -43,6 +44,8 @@ from .sensors import (
 )
 from .shapes import CubeCfg, MeshCfg, SphereCfg
 
+Asset = TypeVar("Asset", Robot, Articulation, RigidObject, RigidObjectGroup, Camera, ContactSensor)
+
 # Fields of RigidBodyAttributesCfg that only PhysX has.
 WITHOUT_MEANING = (
     "contact_offset",
@@ -55,6 +58,7 @@ WITHOUT_MEANING = (
     "max_linear_velocity",
     "max_angular_velocity",
 )
+BACKENDS = ("none", "viser")
 RENDERERS = {"auto": "raster", "hybrid": "hybrid", "fast-rt": "fast_ray_traced", "rt": "ray_traced"}
 
 
@@ -67,17 +71,20 @@ class SimulationManager(Layer):
         changed("PhysicsCfg", physics, defaults, "bounce_threshold", "enable_ccd", "length_tolerance", "speed_tolerance")
         render = self.cfg.render_cfg
         changed("RenderCfg", render, RenderCfg(), "spp", "tone_mapping_enabled", "tone_mapping_exposure")
-        unsupported(
-            "SimulationManagerCfg", profiler=self.cfg.profiler is not None, visualization=self.cfg.visualization is not None
-        )
+        unsupported("SimulationManagerCfg", profiler=self.cfg.profiler is not None)
+        view = self.cfg.visualization
+        if view is not None and view.backend not in BACKENDS:
+            raise ConfigError(f"VisualizationCfg.backend is {view.backend!r}; known names: {', '.join(BACKENDS)}")
         self._steps = 0
         self._lights: list[native.LightCfg] = []
         self._assets: dict[str, Any] = {}
         self.native = self._build()
         self.window: Any = None
+        self.server: Any = None
+        self._is_shown = view is not None and view.backend == "viser"
 
     def _build(self) -> NativeSimulationManager:
-        lights = {"lights": self._lights} if self._lights else {}
+        lights: dict[str, Any] = {"lights": self._lights} if self._lights else {}
         return NativeSimulationManager(
             num_envs=self.cfg.num_envs,
             device=str(self.cfg.sim_device),
@@ -120,6 +127,7 @@ class SimulationManager(Layer):
         if self._assets:
             raise ConfigError("build_multiple_arenas: call it before objects are added, or set num_envs in the configuration")
         self.cfg.num_envs = num
+        self._close_server()
         self.native.destroy()
         self.native = self._build()
 
@@ -130,6 +138,8 @@ class SimulationManager(Layer):
         limit = step_limit()
         if limit is not None and self._steps >= limit:
             raise KeyboardInterrupt
+        if self._is_shown:
+            self.start_visualization()
         self.native.update(step)
         self._steps += step
 
@@ -146,6 +156,26 @@ class SimulationManager(Layer):
         if self.window is not None:
             self.window.close()
             self.window = None
+
+    def start_visualization(self) -> None:
+        """Opens the browser view of ``visualization`` in the configuration and prints its address, as the first ``update``
+        does with the backend ``viser``. It runs in real time."""
+        self._is_shown = True
+        if self.server is None:
+            view = self.cfg.visualization or VisualizationCfg()
+            address = f"{view.viser_server.host}:{view.viser_server.port}"
+            self.server = self.native.serve(address, speed=1.0, max_fps=float(view.scene_fps))
+            print(f"open {self.server.url}", flush=True)
+
+    def stop_visualization(self) -> None:
+        """Closes the browser view."""
+        self._is_shown = False
+        self._close_server()
+
+    def _close_server(self) -> None:
+        if self.server is not None:
+            self.server.close()
+            self.server = None
 
     def add_robot(self, cfg: RobotCfg) -> Robot:
         fields = articulation_fields(cfg)
@@ -200,20 +230,22 @@ class SimulationManager(Layer):
 
     def add_sensor(self, sensor_cfg: CameraCfg | ContactSensorCfg) -> Any:
         """Adds a camera, a pair of cameras, or a contact sensor. Bodies of a contact sensor must exist."""
-        kinds = ((StereoCameraCfg, StereoCamera), (CameraCfg, Camera), (ContactSensorCfg, ContactSensor))
-        kind = next((kind for cfg, kind in kinds if isinstance(sensor_cfg, cfg)), None)
-        if kind is None:
-            raise ConfigError(f"add_sensor: {type(sensor_cfg).__name__} is not the configuration of a sensor")
-        count = sum(type(asset) is kind for asset in self._assets.values())
-        uid = sensor_cfg.uid or f"{kind.__name__.lower()}_{count}"
         if isinstance(sensor_cfg, ContactSensorCfg):
-            return self._register(ContactSensor(self, uid, sensor_cfg))
+            return self._register(ContactSensor(self, sensor_cfg.uid or self._default_uid(ContactSensor), sensor_cfg))
+        if not isinstance(sensor_cfg, CameraCfg):
+            raise ConfigError(f"add_sensor: {type(sensor_cfg).__name__} is not the configuration of a sensor")
+        kind = StereoCamera if isinstance(sensor_cfg, StereoCameraCfg) else Camera
+        uid = sensor_cfg.uid or self._default_uid(kind)
         fields = stereo_cfg(sensor_cfg) if isinstance(sensor_cfg, StereoCameraCfg) else camera_cfg(sensor_cfg)
         render = self.cfg.render_cfg
         if render.renderer not in RENDERERS:
             raise ConfigError(f"RenderCfg.renderer is {render.renderer!r}; known names: {', '.join(RENDERERS)}")
         fields.get("camera", fields)["renderer"] = "hybrid" if self.cfg.enable_rt else RENDERERS[render.renderer]
         return self._register(kind(self, self.native.add_sensor(uid, fields), sensor_cfg))
+
+    def _default_uid(self, kind: type[Layer]) -> str:
+        """Name of a sensor without one."""
+        return f"{kind.__name__.lower()}_{sum(type(asset) is kind for asset in self._assets.values())}"
 
     def add_light(self, cfg: LightCfg) -> None:
         """Adds a light, before anything else is added."""
@@ -230,6 +262,7 @@ class SimulationManager(Layer):
                 cast_shadow=cfg.enable_shadow,
             )
         )
+        self._close_server()
         self.native.destroy()
         self.native = self._build()
 
@@ -266,7 +299,7 @@ class SimulationManager(Layer):
         """Frees the simulation. The process goes on."""
         self.native.destroy()
 
-    def _register(self, asset: Any) -> Any:
+    def _register(self, asset: Asset) -> Asset:
         self._assets[asset.uid] = asset
         return asset
 

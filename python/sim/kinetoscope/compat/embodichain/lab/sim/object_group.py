@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+import kinetoscope as ks
 from kinetoscope.compat._layer import Layer
 from kinetoscope.compat._poses import rows
 from kinetoscope.compat._tensors import array, tensor
+from .cfg import RigidObjectGroupCfg
 from .objects import RigidObjectData, ids, poses
+
+if TYPE_CHECKING:
+    from .manager import SimulationManager
 
 
 class RigidObjectGroupData(RigidObjectData):
@@ -27,7 +32,7 @@ class RigidObjectGroupData(RigidObjectData):
 class RigidObjectGroup(Layer):
     """Rigid objects under one uid. ``native`` is the group of this package."""
 
-    def __init__(self, manager: Any, native: Any, cfg: Any) -> None:
+    def __init__(self, manager: SimulationManager, native: ks.RigidObjectGroup, cfg: RigidObjectGroupCfg) -> None:
         self.manager = manager
         self.native = native
         self.cfg = cfg

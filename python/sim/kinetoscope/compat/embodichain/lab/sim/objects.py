@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+import kinetoscope as ks
+from kinetoscope.cfg import DriveType
 from kinetoscope.compat._layer import Layer
 from kinetoscope.compat._poses import rows, to_matrix
 from kinetoscope.compat._tensors import array, tensor
+from .cfg import ArticulationCfg, RigidObjectCfg
+
+if TYPE_CHECKING:
+    from .manager import SimulationManager
 
 
 def poses(values: Any, to_matrix_form: bool) -> Any:
@@ -22,7 +28,7 @@ def ids(values: Any) -> Any:
 class ArticulationData(Layer):
     """State of an articulation as tensors with the environments on the first axis."""
 
-    def __init__(self, native: Any) -> None:
+    def __init__(self, native: ks.Robot) -> None:
         self._native = native
 
     @property
@@ -114,7 +120,7 @@ class ArticulationData(Layer):
 class Articulation(Layer):
     """An articulation. ``native`` is the object of this package."""
 
-    def __init__(self, manager: Any, native: Any, cfg: Any) -> None:
+    def __init__(self, manager: SimulationManager, native: ks.Robot, cfg: ArticulationCfg) -> None:
         self.manager = manager
         self.native = native
         self.cfg = cfg
@@ -278,7 +284,7 @@ class Articulation(Layer):
         max_velocity: Any = None,
         friction: Any = None,
         armature: Any = None,
-        drive_type: str | None = None,
+        drive_type: DriveType | None = None,
         joint_ids: Any = None,
         env_ids: Any = None,
     ) -> None:
@@ -324,28 +330,30 @@ class Robot(Articulation):
     def _chosen(self, joint_ids: Any, name: str | None) -> Any:
         return joint_ids if name is None else self.native.joint_ids(name)
 
-    def set_qpos(  # type: ignore[override]
+    def set_qpos(
         self, qpos: Any, joint_ids: Any = None, env_ids: Any = None, target: bool = True, name: str | None = None
     ) -> None:
         super().set_qpos(qpos, self._chosen(joint_ids, name), env_ids, target)
 
-    def set_qvel(  # type: ignore[override]
+    def set_qvel(
         self, qvel: Any, joint_ids: Any = None, env_ids: Any = None, target: bool = True, name: str | None = None
     ) -> None:
         super().set_qvel(qvel, self._chosen(joint_ids, name), env_ids, target)
 
-    def set_qf(self, qf: Any, joint_ids: Any = None, env_ids: Any = None, name: str | None = None) -> None:  # type: ignore[override]
+    def set_qf(self, qf: Any, joint_ids: Any = None, env_ids: Any = None, name: str | None = None) -> None:
         super().set_qf(qf, self._chosen(joint_ids, name), env_ids)
 
+    # As in EmbodiChain, the argument comes before that of Articulation.
     def get_qpos(self, name: str | None = None, target: bool = False) -> Any:  # type: ignore[override]
         values = self.native.qpos_target if target else self.native.qpos
         return tensor(values if name is None else values[:, self.native.joint_ids(name)])
 
+    # As in EmbodiChain, the argument comes before that of Articulation.
     def get_qvel(self, name: str | None = None, target: bool = False) -> Any:  # type: ignore[override]
         values = self.native.qvel_target if target else self.native.qvel
         return tensor(values if name is None else values[:, self.native.joint_ids(name)])
 
-    def get_qf(self, name: str | None = None) -> Any:  # type: ignore[override]
+    def get_qf(self, name: str | None = None) -> Any:
         values = self.native.qf
         return tensor(values if name is None else values[:, self.native.joint_ids(name)])
 
@@ -383,7 +391,7 @@ class Robot(Articulation):
 class RigidObjectData(Layer):
     """State of a rigid object."""
 
-    def __init__(self, native: Any) -> None:
+    def __init__(self, native: ks.RigidObject | ks.RigidObjectGroup) -> None:
         self._native = native
 
     @property
@@ -406,7 +414,7 @@ class RigidObjectData(Layer):
 class RigidObject(Layer):
     """A rigid object. ``native`` is the object of this package."""
 
-    def __init__(self, manager: Any, native: Any, cfg: Any) -> None:
+    def __init__(self, manager: SimulationManager, native: ks.RigidObject, cfg: RigidObjectCfg) -> None:
         self.manager = manager
         self.native = native
         self.cfg = cfg

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
+from kinetoscope import Sensor
 from kinetoscope.compat import unsupported
 from kinetoscope.compat._layer import Layer
 from kinetoscope.compat._poses import rows, to_matrix
 from kinetoscope.compat._tensors import array, tensor
 from kinetoscope.compat.configclass import configclass
+
+if TYPE_CHECKING:
+    from .manager import SimulationManager
 
 
 @configclass
@@ -26,6 +30,10 @@ class ExtrinsicsCfg:
     up: Any = None
 
 
+# Inside of CameraCfg, the name of the class is that of an attribute.
+_Extrinsics: TypeAlias = ExtrinsicsCfg
+
+
 @configclass
 class CameraCfg:
     """A camera: ``intrinsics`` are fx fy cx cy [pixels]."""
@@ -38,7 +46,7 @@ class CameraCfg:
     near: float = 0.005
     far: float = 100.0
     intrinsics: Any = (600.0, 600.0, 320.0, 240.0)
-    extrinsics: ExtrinsicsCfg = ExtrinsicsCfg()
+    extrinsics: _Extrinsics = ExtrinsicsCfg()
     enable_color: bool = True
     enable_depth: bool = False
     enable_mask: bool = False
@@ -116,7 +124,7 @@ def vector(values: Any) -> list[float]:
 class Camera(Layer):
     """A camera. ``native`` is the sensor of this package."""
 
-    def __init__(self, manager: Any, native: Any, cfg: CameraCfg) -> None:
+    def __init__(self, manager: SimulationManager, native: Sensor, cfg: CameraCfg) -> None:
         self.manager = manager
         self.native = native
         self.cfg = cfg
@@ -219,12 +227,12 @@ class StereoCamera(Camera):
 class ContactSensor(Layer):
     """Contacts of the listed bodies, at the front of arrays of ``max_contacts_per_env`` rows; others are left out."""
 
-    def __init__(self, manager: Any, uid: str, cfg: ContactSensorCfg) -> None:
+    def __init__(self, manager: SimulationManager, uid: str, cfg: ContactSensorCfg) -> None:
         self.manager = manager
         self.uid = uid
         self.cfg = cfg
         self._bodies: dict[str, int] = {}
-        links = {}
+        links: dict[str, dict[str | None, int]] = {}
         for row, entity, link, _ in manager.native.mask_ids:
             links.setdefault(entity, {})[link] = row
         for name in cfg.rigid_uid_list:
@@ -241,7 +249,7 @@ class ContactSensor(Layer):
         self._data: dict[str, Any] = {}
 
     @staticmethod
-    def _known(links: dict[str, Any], uid: str, field: str) -> Any:
+    def _known(links: dict[str, dict[str | None, int]], uid: str, field: str) -> dict[str | None, int]:
         if uid not in links:
             raise ValueError(f"ContactSensorCfg.{field}: there is no {uid!r}; known: {', '.join(links)}")
         return links[uid]
