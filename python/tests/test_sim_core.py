@@ -247,6 +247,21 @@ def test_handles_belong_to_their_simulation(arm_sim):
     assert twin.qpos.shape == (2, 6)
 
 
+def test_a_recording_is_played_in_a_window_of_its_own_simulation(arm_sim, tmp_path, display):
+    sim, _ = arm_sim
+    with sim.record(tmp_path / "run.npz"):
+        sim.update(3)
+    playback = ks.Playback(tmp_path / "run.npz")
+    foreign, own = sim.open_window(display=display), playback.sim.open_window(display=display)
+    with pytest.raises(ks.ForeignHandleError, match="another simulation"):
+        playback.play(foreign, timeout=60)
+    assert foreign.is_open
+    # A control: a window of the playback's own simulation, until it is closed.
+    own.close()
+    playback.play(own, timeout=60)
+    assert not own.is_open
+
+
 def test_names_and_collections(arm_sim):
     sim, arm = arm_sim
     assert sim.keys() == ["arm"] == list(sim) and len(sim) == 1 and "arm" in sim and "leg" not in sim

@@ -242,8 +242,9 @@ class Playback:
         """Index of the last frame at or before a time [s]; 0 before the first."""
     def play(self, /, window: Window | None = None, timeout: float | None = None) -> None:
         """Shows the recording in the windows and browser views of ``sim``, from the first frame in real time.
-        Viewers pause it, seek, show single frames and change the speed. Returns when ``window`` is closed, after
-        ``timeout`` seconds, or with ``KeyboardInterrupt`` on Ctrl+C. Other calls of ``sim`` wait meanwhile.
+        Viewers pause it, seek, show single frames and change the speed. Returns when ``window``, a window of
+        ``sim``, is closed, after ``timeout`` seconds, or with ``KeyboardInterrupt`` on Ctrl+C. Other calls of
+        ``sim`` wait meanwhile.
         """
     def seek(self, /, frame: int) -> None:
         """Shows a frame, by its index in ``times``."""

@@ -495,12 +495,18 @@ impl Playback {
     }
 
     /// Shows the recording in the windows and browser views of ``sim``, from the first frame in real time. Viewers pause it, seek,
-    /// show single frames and change the speed. Returns when ``window`` is closed, after ``timeout`` seconds, or with
-    /// ``KeyboardInterrupt`` on Ctrl+C. Other calls of ``sim`` wait meanwhile.
+    /// show single frames and change the speed. Returns when ``window``, a window of ``sim``, is closed, after ``timeout``
+    /// seconds, or with ``KeyboardInterrupt`` on Ctrl+C. Other calls of ``sim`` wait meanwhile.
     #[pyo3(signature = (window=None, timeout=None))]
     fn play(&self, py: Python<'_>, window: Option<&Bound<'_, Window>>, timeout: Option<f64>) -> PyResult<()> {
         let (longest, started) = (time_limit(timeout, "timeout")?, Instant::now());
-        let window = window.map(|window| &window.get().inner);
+        let window = window.map(|window| window.get());
+        if window.is_some_and(|window| !Arc::ptr_eq(&window.shared, &self.shared)) {
+            let message = "play: the window shows another simulation; give a window of the attribute sim of this playback, \
+                           opened by sim.open_window()";
+            return Err(Failure::new(Class::ForeignHandle, message).into());
+        }
+        let window = window.map(|window| &window.inner);
         interruptible(py, |stop| {
             self.shared.write_detached(|sim| {
                 let mut playback = self.lock();

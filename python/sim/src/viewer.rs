@@ -54,6 +54,7 @@ impl Server {
 #[pyclass(frozen, module = "kinetoscope")]
 #[derive(Debug)]
 pub(crate) struct Window {
+    pub(crate) shared: Arc<Shared>,
     pub(crate) inner: kinetoscope::viewer::Window,
 }
 
@@ -289,7 +290,7 @@ impl Simulation {
         check_speed(cfg.speed, "speed")?;
         check_size(cfg.size)?;
         let inner = self.shared.write_with_threads(py, |sim| Ok(sim.open_window_with(cfg)?))?;
-        Ok(Window { inner })
+        Ok(Window { shared: Arc::clone(&self.shared), inner })
     }
 
     /// Image of all environments, or of one, RGBA, uint8, shape (height, width, 4). With a path, a PNG file is written
