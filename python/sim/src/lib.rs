@@ -22,6 +22,7 @@ mod shared;
 mod simulation;
 mod snapshot;
 mod task;
+mod timed_lock;
 mod values;
 mod viewer;
 mod viewer_control;

@@ -261,7 +261,7 @@ impl Simulation {
     /// the call after the current step.
     fn verify_recording<'py>(&self, py: Python<'py>, path: PathBuf) -> PyResult<Bound<'py, PyDict>> {
         let result = interruptible(py, |stop| {
-            self.shared.write_detached(|sim| Ok(record::replay::verify_until(stop, sim, path)?))
+            self.shared.write_detached(stop, |sim| Ok(record::replay::verify_until(stop, sim, path)?))
         })?;
         let dict = PyDict::new(py);
         dict.set_item("identical", result.is_identical())?;
@@ -508,7 +508,7 @@ impl Playback {
         }
         let window = window.map(|window| &window.inner);
         interruptible(py, |stop| {
-            self.shared.write_detached(|sim| {
+            self.shared.write_detached(stop, |sim| {
                 let mut playback = self.lock();
                 let mut goes_on = || {
                     let is_open = window.is_none_or(kinetoscope::viewer::Window::is_open);
