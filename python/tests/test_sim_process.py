@@ -153,7 +153,7 @@ def test_fork(threads, code):
     assert result.stdout.split() == [code, "0.04"], result.stdout + result.stderr
 
 
-@pytest.mark.parametrize("start", ["keep = sim.record('file.npz')", "keep = sim.serve()", "keep = sim.show()"])
+@pytest.mark.parametrize("start", ["keep = sim.record('file.npz')", "keep = sim.serve()", "keep = sim.show()", "keep = sim.viewer()"])
 @pytest.mark.parametrize("act", ["sim.update(500)", "sim.destroy()", "del sim, arm, keep"])
 def test_fork_with_threads_of_recordings_and_viewers(start, act, tmp_path):
     """threads=1 starts no workers, but recordings and viewers have threads, which the child does not have."""
@@ -168,6 +168,43 @@ def test_fork_with_threads_of_recordings_and_viewers(start, act, tmp_path):
     )
     result = python(code, cwd=tmp_path)
     assert result.stdout == ("3\n" if act.startswith("del") else "4\n"), result.stdout + result.stderr
+
+
+# Objects with threads, and arguments of their methods.
+THREADED = {
+    "sim.open_window()": {},
+    "ks.ImageWindow()": {"show": "np.zeros((2, 2, 3), np.uint8)", "__exit__": ""},
+    "sim.viewer()": {"set_speed": "1.0", "seek": "0.0", "__exit__": ""},
+    "sim.record('file.npz')": {"note": "'text'", "__exit__": ""},
+    "sim.serve()": {},
+}
+# Members that only return a value that the object has.
+WITHOUT_THREADS = {"Recorder": {"path"}, "Server": {"url", "viewers"}}
+
+
+@pytest.mark.parametrize("start", THREADED)
+def test_fork_with_objects_that_have_threads(start, tmp_path, display):
+    """Every member of such an object raises in the child, and none waits for a thread that does not exist. In the parent, the
+    object is as before."""
+    code = SCENE.format(threads=1) + (
+        f"import os, signal\nimport numpy as np\nkeep = {start}\nsim.update(2)\narguments = {THREADED[start]!r}\n"
+        "names = [name for name in dir(type(keep)) if not name.startswith('_')] + [name for name in arguments if name[0] == '_']\n"
+        "def act(name):\n"
+        "    value = getattr(keep, name)\n"
+        "    return value(*eval(f'[{arguments.get(name, str())}]')) if callable(value) else value\n"
+        "before = repr(keep)\npid = os.fork()\n"
+        "if pid == 0:\n    signal.alarm(20)\n    raised = []\n"
+        "    for name in names:\n"
+        "        try:\n            act(name)\n"
+        "        except ks.ForkError as error:\n            assert 'spawn' in str(error)\n            raised.append(name)\n"
+        "    print(*sorted(set(names) - set(raised)), flush=True)\n    del keep, sim, arm\n    os._exit(7)\n"
+        "status = os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1])\nassert repr(keep) == before\nact('finish' if 'finish' in names else 'close')\n"
+        "print(type(keep).__name__, status)\n"
+    )
+    result = python(code, cwd=tmp_path, env={**os.environ, "DISPLAY": display})
+    plain, last = result.stdout.split("\n")[:2] if result.stdout.count("\n") == 2 else (result.stdout, "")
+    name, status = last.split() if last else ("", "")
+    assert status == "7" and set(plain.split()) == WITHOUT_THREADS.get(name, set()), result.stdout + result.stderr
 
 
 VIEWED = """

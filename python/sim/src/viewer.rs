@@ -3,7 +3,7 @@
 use crate::arguments::{bytes, time_limit};
 use crate::cfg;
 use crate::errors::Failure;
-use crate::shared::{SIGNAL_INTERVAL, Shared, detached, guarded};
+use crate::shared::{Process, SIGNAL_INTERVAL, Shared, detached, guarded};
 use crate::simulation::Simulation;
 use crate::values::Values;
 use crate::viewer_control::check_speed;
@@ -77,40 +77,53 @@ fn failure(window: &kinetoscope::viewer::Window) -> Option<String> {
     window.closed().and_then(|closed| closed.error().map(String::from))
 }
 
+impl Window {
+    /// The window. Fails in a forked process, which does not have its thread.
+    fn window(&self) -> Result<&kinetoscope::viewer::Window, Failure> {
+        self.shared.process().check("this window")?;
+        Ok(&self.inner)
+    }
+}
+
 #[pymethods]
 impl Window {
     /// True while the window is open.
     #[getter]
-    fn is_open(&self) -> bool {
-        self.inner.is_open()
+    fn is_open(&self) -> PyResult<bool> {
+        Ok(self.window()?.is_open())
     }
 
     /// Number of frames sent to the display.
     #[getter]
-    fn frame_count(&self) -> u64 {
-        self.inner.frame_count()
+    fn frame_count(&self) -> PyResult<u64> {
+        Ok(self.window()?.frame_count())
     }
 
     /// Waits until the window is closed, at most ``timeout`` seconds, and returns True if it is. The user, a call of
     /// ``close`` or the end of the simulation closes it.
     #[pyo3(signature = (timeout=None))]
     fn wait(&self, py: Python<'_>, timeout: Option<f64>) -> PyResult<bool> {
-        wait_until_closed(py, &self.inner, timeout)
+        wait_until_closed(py, self.window()?, timeout)
     }
 
     /// Error that closed the window, such as a lost display; None if it is open or was closed as intended.
     #[getter]
     fn failure(&self) -> PyResult<Option<String>> {
-        Ok(guarded(|| Ok(failure(&self.inner)))?)
+        Ok(guarded(|| Ok(failure(self.window()?)))?)
     }
 
     /// Requests the window to close, without waiting.
-    fn close(&self) {
-        self.inner.close();
+    fn close(&self) -> PyResult<()> {
+        self.window()?.close();
+        Ok(())
     }
 
     fn __repr__(&self) -> &'static str {
-        if self.inner.is_open() { "<Window, open>" } else { "<Window, closed>" }
+        match self.window() {
+            Err(_) => "<Window of another process>",
+            Ok(window) if window.is_open() => "<Window, open>",
+            Ok(_) => "<Window, closed>",
+        }
     }
 }
 
@@ -120,6 +133,19 @@ impl Window {
 #[derive(Debug)]
 pub(crate) struct ImageWindow {
     inner: kinetoscope::viewer::ImageWindow,
+    process: Process,
+}
+
+impl ImageWindow {
+    /// The window. Fails in a forked process, which does not have its thread.
+    fn images(&self) -> Result<&kinetoscope::viewer::ImageWindow, Failure> {
+        self.process.check("this window")?;
+        Ok(&self.inner)
+    }
+
+    fn window(&self) -> Result<&kinetoscope::viewer::Window, Failure> {
+        Ok(self.images()?.window())
+    }
 }
 
 #[pymethods]
@@ -133,7 +159,8 @@ impl ImageWindow {
         let (title, size) = (title.unwrap_or(defaults.title), size.unwrap_or(defaults.size));
         check_size(size)?;
         let cfg = ImageWindowCfg { title, size, display };
-        Ok(Self { inner: detached(py, || Ok(kinetoscope::viewer::ImageWindow::open(cfg)?))? })
+        let inner = detached(py, || Ok(kinetoscope::viewer::ImageWindow::open(cfg)?))?;
+        Ok(Self { inner, process: Process::current() })
     }
 
     /// Replaces the image and returns at once: uint8, shape (height, width, 4) or (height, width, 3). It is scaled to fit into the
@@ -141,38 +168,39 @@ impl ImageWindow {
     fn show(&self, py: Python<'_>, image: &Bound<'_, PyAny>) -> PyResult<()> {
         let pixels = bytes(image, "image")?;
         detached(py, || {
-            self.inner.show(canvas(&pixels)?);
+            self.images()?.show(canvas(&pixels)?);
             Ok(())
         })
     }
 
     /// True while the window is open.
     #[getter]
-    fn is_open(&self) -> bool {
-        self.inner.window().is_open()
+    fn is_open(&self) -> PyResult<bool> {
+        Ok(self.window()?.is_open())
     }
 
     /// Number of frames sent to the display.
     #[getter]
-    fn frame_count(&self) -> u64 {
-        self.inner.window().frame_count()
+    fn frame_count(&self) -> PyResult<u64> {
+        Ok(self.window()?.frame_count())
     }
 
     /// Waits until the window is closed, at most ``timeout`` seconds, and returns True if it is.
     #[pyo3(signature = (timeout=None))]
     fn wait(&self, py: Python<'_>, timeout: Option<f64>) -> PyResult<bool> {
-        wait_until_closed(py, self.inner.window(), timeout)
+        wait_until_closed(py, self.window()?, timeout)
     }
 
     /// Error that closed the window, such as a lost display; None if it is open or was closed as intended.
     #[getter]
     fn failure(&self) -> PyResult<Option<String>> {
-        Ok(guarded(|| Ok(failure(self.inner.window())))?)
+        Ok(guarded(|| Ok(failure(self.window()?)))?)
     }
 
     /// Requests the window to close, without waiting.
-    fn close(&self) {
-        self.inner.window().close();
+    fn close(&self) -> PyResult<()> {
+        self.window()?.close();
+        Ok(())
     }
 
     fn __enter__(slf: Bound<'_, Self>) -> Bound<'_, Self> {
@@ -180,12 +208,16 @@ impl ImageWindow {
     }
 
     #[pyo3(signature = (*_exception))]
-    fn __exit__(&self, _exception: &Bound<'_, pyo3::types::PyTuple>) {
-        self.close();
+    fn __exit__(&self, _exception: &Bound<'_, pyo3::types::PyTuple>) -> PyResult<()> {
+        self.close()
     }
 
     fn __repr__(&self) -> &'static str {
-        if self.is_open() { "<ImageWindow, open>" } else { "<ImageWindow, closed>" }
+        match self.window() {
+            Err(_) => "<ImageWindow of another process>",
+            Ok(window) if window.is_open() => "<ImageWindow, open>",
+            Ok(_) => "<ImageWindow, closed>",
+        }
     }
 }
 

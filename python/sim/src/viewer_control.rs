@@ -26,7 +26,8 @@ impl Simulation {
     fn viewer(&self, py: Python<'_>) -> PyResult<Viewer> {
         let request =
             SnapshotRequest { contacts: None, markers: false, joints: false, cameras: false, ..Default::default() };
-        let inner = self.shared.write(py, |sim| Ok(sim.viewer(request)))?;
+        // Another thread of the program steps the simulation that the viewer controls. A forked process does not have it.
+        let inner = self.shared.write_with_threads(py, |sim| Ok(sim.viewer(request)))?;
         Ok(Viewer { shared: Arc::clone(&self.shared), inner: Mutex::new(Some(inner)) })
     }
 }
@@ -81,7 +82,7 @@ impl Viewer {
     /// ``end`` [s] while ``Playback.play`` shows a recording, otherwise None. ``steps`` is then the index of the frame.
     #[getter]
     fn state<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let newest = detached(py, || match self.lock().as_ref() {
+        let newest = detached(py, || match self.lock()?.as_ref() {
             Some(viewer) => Ok(viewer.newest()),
             None => Err(closed()),
         })?;
@@ -107,7 +108,7 @@ impl Viewer {
     /// Ends the viewer, its pause and its speed. A second call does nothing.
     fn close(&self, py: Python<'_>) -> PyResult<()> {
         detached(py, || {
-            let viewer = self.lock().take();
+            let viewer = self.lock()?.take();
             drop(viewer);
             Ok(())
         })
@@ -123,13 +124,17 @@ impl Viewer {
     }
 
     fn __repr__(&self) -> &'static str {
-        if self.lock().is_some() { "<Viewer>" } else { "<Viewer, closed>" }
+        match self.lock().map(|viewer| viewer.is_some()) {
+            Err(_) => "<Viewer of another process>",
+            Ok(true) => "<Viewer>",
+            Ok(false) => "<Viewer, closed>",
+        }
     }
 }
 
 impl Viewer {
     fn send(&self, py: Python<'_>, command: Command) -> PyResult<()> {
-        let sent = detached(py, || match self.lock().as_ref() {
+        let sent = detached(py, || match self.lock()?.as_ref() {
             Some(viewer) => Ok(viewer.send(command)),
             None => Err(closed()),
         })?;
@@ -140,9 +145,20 @@ impl Viewer {
         Err(Failure::new(Class::Viewer, message).into())
     }
 
-    /// The viewer. The lock is never held during a step, or while waiting for Python's lock.
-    fn lock(&self) -> MutexGuard<'_, Option<viewer::Viewer>> {
-        self.inner.lock().unwrap_or_else(PoisonError::into_inner)
+    /// The viewer. The lock is never held during a step, or while waiting for Python's lock. Fails in a forked process,
+    /// which does not have a thread that held it.
+    fn lock(&self) -> Result<MutexGuard<'_, Option<viewer::Viewer>>, Failure> {
+        self.shared.process().check("this viewer")?;
+        Ok(self.inner.lock().unwrap_or_else(PoisonError::into_inner))
+    }
+}
+
+impl Drop for Viewer {
+    fn drop(&mut self) {
+        // The end of a viewer takes a lock that a thread of the parent process may have held.
+        if !self.shared.process().is_current() {
+            std::mem::forget(self.inner.get_mut().unwrap_or_else(PoisonError::into_inner).take());
+        }
     }
 }
 
