@@ -16,7 +16,7 @@ VALUES = {
     "force": [0.0] * 3, "forces": [0.0] * 3, "frame": 0, "group": "policy", "image": np.zeros((2, 2, 3), np.uint8),
     "intrinsics": [[1.0] * 4], "left": [[1.0] * 4], "link": "cart", "mask": np.zeros((1, 2, 2), np.int32), "name": "cube", "on": True,
     "one": "cube", "other": "cart", "path": lambda world: world["folder"] / "x.npz", "patterns": ".*", "poses": [[0.0] * 7],
-    "positions": [[0.0]], "property": "mass", "qpos": [[0.0]], "randomization": [], "right": [[1.0] * 4], "seconds": 0.01,
+    "positions": [[0.0]], "property": "mass", "qacc": [[0.0]], "qpos": [[0.0]], "randomization": [], "right": [[1.0] * 4], "seconds": 0.01,
     "sensor": lambda world: world["Sensor"], "shown": True, "site": "x", "snapshot": lambda world: world["Snapshot"], "speed": 1.0,
     "target": [0.0] * 3, "targets": [[0.0] * 7], "text": "a note", "time": 0.5, "tip": "cart", "topic": "x", "torque": [0.0] * 3,
     "torques": [0.0] * 3, "uid": "cube", "values": [0.0], "velocities": [[0.0]], "x": 0.0, "y": 0.0,

@@ -385,6 +385,34 @@ class Robot:
         """Indices of the links whose names match a pattern, or one of several."""
     def jacobian(self, /, tip: str, qpos: ArrayLike | None = None, link: str | None = None, tcp: _Numbers | None = None, env_ids: _Envs = None) -> _Array:
         """Jacobians of a frame, shape (num_envs, 6, joints); at the current positions without ``qpos``."""
+    def bias_force(self, /, qpos: ArrayLike | None = None, qvel: ArrayLike | None = None, env_ids: _Envs = None) -> _Array:
+        """Generalized forces at zero acceleration, c(q, v) + g(q) of the equation of motion [N m or N],
+        ``qfrc_bias`` of MuJoCo, shape (num_envs, columns), with the columns of ``mass_matrix``. Joint positions and
+        velocities are the current ones by default; a floating base has its current pose and velocity. Velocities of
+        mimic joints are used as given.
+        """
+    def center_of_mass(self, /, qpos: ArrayLike | None = None, env_ids: _Envs = None) -> _Array:
+        """Centers of mass of the robot in the environment [m], shape (num_envs, 3), at joint positions, by default
+        the current ones.
+        """
+    def inverse_dynamics(self, /, qacc: ArrayLike, qpos: ArrayLike | None = None, qvel: ArrayLike | None = None, env_ids: _Envs = None) -> _Array:
+        """Generalized forces M a + c + g that produce accelerations, shape (num_envs, columns), with the columns of
+        ``mass_matrix`` [N m or N], rotor inertias included. Accelerations are the rates of change of the velocities
+        of these columns, shape (num_envs, columns) [rad/s² or m/s²]. Damping and friction of joints are not
+        included. Joint positions and velocities are those of ``bias_force``.
+        """
+    def kinetic_energy(self, /, qpos: ArrayLike | None = None, qvel: ArrayLike | None = None, env_ids: _Envs = None) -> _Array:
+        """Kinetic energies [J], rotor inertias included, shape (num_envs,). Joint positions and velocities are those
+        of ``bias_force``.
+        """
+    def momentum(self, /, qpos: ArrayLike | None = None, qvel: ArrayLike | None = None, env_ids: _Envs = None) -> _Array:
+        """Momenta of the links in the axes of the environment, shape (num_envs, 6): linear [kg m/s], then angular
+        about the center of mass [kg m²/s]. Joint positions and velocities are those of ``bias_force``.
+        """
+    def potential_energy(self, /, qpos: ArrayLike | None = None, env_ids: _Envs = None) -> _Array:
+        """Potential energies in the gravity of the simulation [J], zero at the origin of the environment, shape
+        (num_envs,), at joint positions, by default the current ones.
+        """
     def gravity_torque(self, /, qpos: ArrayLike | None = None, env_ids: _Envs = None) -> _Array:
         """Generalized forces that hold the robot still against gravity at joint positions, by default the current
         ones [N m or N], shape (num_envs, columns), with the columns of ``mass_matrix``. Gravity itself exerts the
