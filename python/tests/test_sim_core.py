@@ -327,6 +327,39 @@ def test_simulations_run_at_the_same_time():
     assert longest > alone / 2
 
 
+def longest_pause(work):
+    """Longest pause of this thread while another one works, and the duration of the work [s]."""
+    seconds = []
+
+    def timed():
+        started = time.perf_counter()
+        work()
+        seconds.append(time.perf_counter() - started)
+
+    thread = threading.Thread(target=timed)
+    longest, last = 0.0, time.perf_counter()
+    thread.start()
+    while thread.is_alive():
+        now = time.perf_counter()
+        longest, last = max(longest, now - last), now
+    return longest, seconds[0]
+
+
+def test_other_threads_run_while_a_camera_renders():
+    """The interpreter is released while a path-traced image is rendered. A control: a call of Python's own that holds it."""
+    sim = ks.SimulationManager(threads=1)
+    sim.add_rigid_object(uid="cube")
+    look = ks.Placement.look_at(eye=[2, 0, 1], target=[0, 0, 0.3])
+    cfg = ks.CameraCfg(
+        width=320, height=240, extrinsics=ks.Extrinsics(placement=look), renderer=ks.CameraRenderer.ray_traced(samples=16)
+    )
+    camera = sim.add_sensor("camera", cfg)
+    longest, seconds = longest_pause(lambda: camera["color"])
+    assert seconds > 0.5 and longest < seconds / 2, (longest, seconds)
+    longest, seconds = longest_pause(lambda: sum(range(30_000_000)))
+    assert longest > seconds / 2, (longest, seconds)
+
+
 def runnable_threads(simulations):
     """Mean number of threads that run or wait for a core, while each simulation works in a thread of its own. Waiting for a
     lock does not count, so load of other programs changes nothing."""
