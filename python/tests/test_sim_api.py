@@ -266,7 +266,6 @@ LEFT_OUT = {
     "Viewer.has_ended": "a call of an ended simulation raises",
     "Viewer.set_request": "snapshots of viewers are not in Python",
     "Viewer.wait": "snapshots of viewers are not in Python",
-    "ViewerExt.set_record_button": EXTENSION,
     "Warnings.buffer_growths": "a measure for tests of memory",
     "Window.id": "for tests that capture windows",
 }

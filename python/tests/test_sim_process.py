@@ -174,7 +174,9 @@ def test_fork_with_threads_of_recordings_and_viewers(start, act, tmp_path):
 THREADED = {
     "sim.open_window()": {},
     "ks.ImageWindow()": {"show": "np.zeros((2, 2, 3), np.uint8)", "__exit__": ""},
-    "sim.viewer()": {"set_speed": "1.0", "seek": "0.0", "__exit__": ""},
+    "sim.viewer()": {
+        "set_speed": "1.0", "seek": "0.0", "set_target": "arm, 0, 0.0", "drag": "'sr5/link1', [0, 0, 0]", "__exit__": "",
+    },  # fmt: skip
     "sim.record('file.npz')": {"note": "'text'", "__exit__": ""},
     "sim.serve()": {},
 }

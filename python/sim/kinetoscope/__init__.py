@@ -19,6 +19,7 @@ preload()
 
 from . import cfg, errors  # noqa: E402
 from ._sim import (  # noqa: E402
+    FileRecording,
     FoxgloveServer,
     IkResult,
     ImageWindow,
@@ -86,6 +87,7 @@ def __dir__() -> list[str]:
 __all__ = [
     "BatchRenderer",
     "Diagnostic",
+    "FileRecording",
     "FoxgloveServer",
     "IkResult",
     "ImageWindow",

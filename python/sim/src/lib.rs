@@ -12,6 +12,7 @@ mod channels;
 mod device;
 mod dynamics;
 mod errors;
+mod file_recording;
 mod html;
 mod objects;
 mod recording;
@@ -172,6 +173,7 @@ fn _sim(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<recording::RecordingSummary>()?;
     module.add_class::<recording::Playback>()?;
     module.add_class::<recording::FoxgloveServer>()?;
+    module.add_class::<file_recording::FileRecording>()?;
     module.add_class::<viewer::Server>()?;
     module.add_class::<viewer::Window>()?;
     module.add_class::<viewer::ImageWindow>()?;

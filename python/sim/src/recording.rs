@@ -143,6 +143,14 @@ impl RecordingSummary {
     }
 }
 
+impl From<record::RecordingSummary> for RecordingSummary {
+    fn from(summary: record::RecordingSummary) -> Self {
+        let text = summary.to_string();
+        let record::RecordingSummary { path, bytes, packets, waits, left_out, .. } = summary;
+        Self { path, bytes, packets, waits, left_out, text }
+    }
+}
+
 impl Recorder {
     fn finish_once(&self, py: Python<'_>) -> PyResult<RecordingSummary> {
         let summary = self.shared.write(py, |sim| {
@@ -151,9 +159,7 @@ impl Recorder {
             self.finished.store(true, Ordering::Relaxed);
             Ok(finished?)
         })?;
-        let text = summary.to_string();
-        let record::RecordingSummary { path, bytes, packets, waits, left_out, .. } = summary;
-        Ok(RecordingSummary { path, bytes, packets, waits, left_out, text })
+        Ok(summary.into())
     }
 }
 
@@ -233,10 +239,7 @@ impl Simulation {
         overview_size: Option<[usize; 2]>,
         overview_fps: Option<f64>,
     ) -> PyResult<Recorder> {
-        let base = match path.extract::<PathBuf>() {
-            Ok(path) => RecorderCfg::new(path),
-            Err(_) => cfg::read("RecorderCfg", Some(path))?,
-        };
+        let base = recorder_cfg(path)?;
         let cfg = RecorderCfg {
             format: format.map(format_of).transpose()?.or(base.format),
             topics: topics.map_or(Ok(base.topics), topics_of)?,
@@ -269,6 +272,14 @@ impl Simulation {
         dict.set_item("values", result.values)?;
         dict.set_item("difference", result.difference.map(|difference| format!("{difference:?}")))?;
         Ok(dict)
+    }
+}
+
+/// Configuration of an argument: a path, a ``RecorderCfg``, or a dict of its fields.
+pub(crate) fn recorder_cfg(path: &Bound<'_, PyAny>) -> PyResult<RecorderCfg> {
+    match path.extract::<PathBuf>() {
+        Ok(path) => Ok(RecorderCfg::new(path)),
+        Err(_) => cfg::read("RecorderCfg", Some(path)),
     }
 }
 

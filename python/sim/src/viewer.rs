@@ -3,6 +3,7 @@
 use crate::arguments::{bytes, time_limit};
 use crate::cfg;
 use crate::errors::Failure;
+use crate::file_recording::FileRecording;
 use crate::shared::{Process, SIGNAL_INTERVAL, Shared, detached, guarded};
 use crate::simulation::Simulation;
 use crate::values::Values;
@@ -250,9 +251,9 @@ fn canvas(pixels: &ArrayD<u8>) -> Result<Canvas, Failure> {
 impl Simulation {
     /// Serves the simulation to browsers; port 0 selects a free port. ``cfg`` is a ``ServeCfg``; keyword arguments replace
     /// its fields. ``speed`` is simulated seconds per second. ``allow_local_frames`` lets web pages of this machine show the
-    /// view in a frame, as notebooks do.
+    /// view in a frame, as notebooks do. ``record_button`` is the ``file_recording`` that the record button starts and stops.
     #[pyo3(signature = (address="127.0.0.1:0", *, speed=None, max_fps=None, max_viewers=None, jpeg_quality=None,
-        allow_local_frames=None, cfg=None))]
+        allow_local_frames=None, record_button=None, cfg=None))]
     #[expect(clippy::too_many_arguments, reason = "keyword arguments of a Python method")]
     fn serve(
         &self,
@@ -263,8 +264,10 @@ impl Simulation {
         max_viewers: Option<usize>,
         jpeg_quality: Option<u8>,
         allow_local_frames: Option<bool>,
+        record_button: Option<&Bound<'_, FileRecording>>,
         cfg: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Server> {
+        let button = record_button.map(|button| button.get().button(&self.shared, "serve")).transpose()?;
         let base = match cfg {
             None => ServeCfg::default(),
             Some(cfg) => cfg::of_table("ServeCfg", speed_table("ServeCfg", cfg)?.0)?,
@@ -275,7 +278,7 @@ impl Simulation {
             max_viewers: max_viewers.unwrap_or(base.max_viewers),
             jpeg_quality: jpeg_quality.unwrap_or(base.jpeg_quality),
             allow_local_frames: allow_local_frames.unwrap_or(base.allow_local_frames),
-            ..base
+            record_button: button,
         };
         check_speed(cfg.speed, "speed")?;
         if !(cfg.max_fps > 0.0 && cfg.max_fps.is_finite()) {
@@ -290,9 +293,10 @@ impl Simulation {
     }
 
     /// Opens a window that shows the simulation while it steps, in real time unless ``speed`` is another factor, or
-    /// None for no limit. ``cfg`` is a ``WindowCfg``, in place of the other arguments. Raises ``ViewerError`` without a
-    /// display.
-    #[pyo3(signature = (title=None, size=None, *, speed=1.0, display=None, cfg=None))]
+    /// None for no limit. ``record_button`` is the ``file_recording`` that the record button starts and stops. ``cfg`` is a
+    /// ``WindowCfg``, in place of the arguments before ``record_button``. Raises ``ViewerError`` without a display.
+    #[pyo3(signature = (title=None, size=None, *, speed=1.0, display=None, record_button=None, cfg=None))]
+    #[expect(clippy::too_many_arguments, reason = "keyword arguments of a Python method")]
     fn open_window(
         &self,
         py: Python<'_>,
@@ -300,8 +304,10 @@ impl Simulation {
         size: Option<[usize; 2]>,
         speed: Option<f64>,
         display: Option<String>,
+        record_button: Option<&Bound<'_, FileRecording>>,
         cfg: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Window> {
+        let button = record_button.map(|button| button.get().button(&self.shared, "open_window")).transpose()?;
         let cfg = if let Some(cfg) = cfg {
             if title.is_some() || size.is_some() || display.is_some() || speed != Some(1.0) {
                 return Err(Failure::argument("open_window", "give cfg or the other arguments, not both").into());
@@ -321,6 +327,7 @@ impl Simulation {
         };
         check_speed(cfg.speed, "speed")?;
         check_size(cfg.size)?;
+        let cfg = WindowCfg { record_button: button, ..cfg };
         let inner = self.shared.write_with_threads(py, |sim| Ok(sim.open_window_with(cfg)?))?;
         Ok(Window { shared: Arc::clone(&self.shared), inner })
     }
@@ -377,7 +384,7 @@ impl Simulation {
             let problem = format!("width {width} and height {height}; both must be at least 1 pixel");
             return Err(Failure::argument("show", problem).into());
         }
-        let server = slf.get().serve(py, "127.0.0.1:0", None, None, None, None, Some(true), None)?;
+        let server = slf.get().serve(py, "127.0.0.1:0", None, None, None, None, Some(true), None, None)?;
         let frame = py.import("kinetoscope.notebook")?.getattr("Frame")?;
         frame.call1((server, width, height)).map(Bound::unbind)
     }
