@@ -33,6 +33,7 @@ PLAIN = {
     "ImageWindow": "close frame_count is_open __enter__ __exit__ __repr__",
     "Playback": "sim",
     "Recorder": "path __repr__ __enter__",
+    "RenderProgress": "cancel fraction is_canceled rays resume samples total __repr__",
     "Robot": "kind",
     "Segmentation": "__repr__",
     "Sensor": "uid",
@@ -60,7 +61,7 @@ def world_of(folder, display):
         sim.update(2)
     world = {
         "folder": folder, "SimulationManager": sim, "Robot": cart, "RigidObject": cube, "RigidObjectGroup": group, "Terrain": terrain,
-        "MjcfPart": part, "Sensor": camera, "Segmentation": sim.segmentation(), "Snapshot": sim.snapshot(),
+        "MjcfPart": part, "Sensor": camera, "RenderProgress": camera.progress, "Segmentation": sim.segmentation(), "Snapshot": sim.snapshot(),
         "Recorder": sim.record(folder / "new.npz", overwrite=True), "FileRecording": sim.file_recording(folder / "files.npz"), "FoxgloveServer": sim.stream_to_foxglove("127.0.0.1:0"),
         "Server": sim.serve(), "Viewer": sim.viewer(), "Window": sim.open_window(display=display),
         "ImageWindow": ks.ImageWindow(display=display), "Playback": ks.Playback(path, sim), "Weld": weld,

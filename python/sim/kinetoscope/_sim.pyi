@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from ._sim_entities import (
     IkResult,
     MjcfPart,
+    RenderProgress,
     RigidObject,
     RigidObjectGroup,
     Robot,
@@ -99,6 +100,7 @@ __all__ = [
     "Playback",
     "Recorder",
     "RecordingSummary",
+    "RenderProgress",
     "RigidObject",
     "RigidObjectGroup",
     "Robot",

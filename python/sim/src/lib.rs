@@ -15,6 +15,7 @@ mod errors;
 mod file_recording;
 mod html;
 mod objects;
+mod progress;
 mod recording;
 mod robot;
 mod segmentation;
@@ -165,6 +166,7 @@ fn _sim(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<objects::MjcfPart>()?;
     module.add_class::<objects::Weld>()?;
     module.add_class::<sensor::Sensor>()?;
+    module.add_class::<progress::RenderProgress>()?;
     module.add_class::<segmentation::Segmentation>()?;
     module.add_class::<snapshot::Snapshot>()?;
     module.add_class::<task::Task>()?;
