@@ -13,8 +13,8 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-# Files of the stub: the module, and the classes that it imports from a second file.
-STUBS = ("_sim.pyi", "_sim_entities.pyi")
+# Files of the stub: the module, and those of the classes that it imports.
+STUBS = ("_sim.pyi", "_sim_entities.pyi", "_sim_views.pyi")
 # Length of lines.
 WIDTH = 120
 

@@ -1,5 +1,8 @@
 """Calibration of cameras: camera_info, its files, rectification of pairs, and images on their way."""
 
+import threading
+import time
+
 import cv2
 import numpy as np
 import pytest
@@ -137,3 +140,70 @@ def test_images_on_their_way():
     assert imu.stamp_history.shape == (2, 0)
     with pytest.raises(ks.ArgumentError, match="not a camera"):
         imu.image_shape  # noqa: B018
+
+
+def test_poses_and_intrinsics_of_images_on_their_way():
+    """With a latency, those of the delivered images: where the parent was at the capture, and the program's intrinsics at the
+    delivery."""
+    sim = ks.SimulationManager(num_envs=2, threads=1, ground=None, gravity=[0, 0, 0])
+    cart = sim.add_rigid_object(uid="cart", body_type="kinematic", init_pose=[0, 0, 1, 1, 0, 0, 0])
+    cfg = ks.CameraCfg(width=16, height=12, channels=["depth"], extrinsics=ks.Extrinsics(parent="cart"), latency_steps=5)
+    camera = sim.add_sensor("eye", cfg)
+    sim.update(20)
+    poses, matrices = camera.pose_w("opengl"), camera.intrinsic_matrices
+    np.testing.assert_array_equal(camera.latest_delivered_pose_w("opengl"), poses)
+    np.testing.assert_array_equal(camera.latest_delivered_intrinsic_matrices, matrices)
+    cart.write_pose([0, 5, 1, 1, 0, 0, 0], env_ids=[1])
+    camera.set_intrinsics([20.0, 21.0, 8.0, 6.0], env_ids=[1])
+    # Current images show the write at once. Delivered ones are older, in the environment of the write.
+    np.testing.assert_allclose(camera.pose_w("opengl")[:, 1] - poses[:, 1], [0, 5], atol=1e-12)
+    np.testing.assert_array_equal(camera.latest_delivered_pose_w("opengl"), poses)
+    assert (camera.latest_delivered_pose_w() != poses).any()
+    np.testing.assert_array_equal(camera.intrinsic_matrices[1], [[20, 0, 8], [0, 21, 6], [0, 0, 1]])
+    np.testing.assert_array_equal(camera.latest_delivered_intrinsic_matrices, matrices)
+    sim.update(6)
+    np.testing.assert_array_equal(camera.latest_delivered_pose_w("opengl"), camera.pose_w("opengl"))
+    np.testing.assert_array_equal(camera.latest_delivered_intrinsic_matrices, camera.intrinsic_matrices)
+    with pytest.raises(ks.ArgumentError, match='"ros", "opengl" or "world"'):
+        camera.latest_delivered_pose_w("open-gl")
+
+
+def test_path_tracing_is_canceled_from_another_thread():
+    sim = scene(eye=ks.CameraCfg(width=64, height=48, extrinsics=AHEAD, renderer=ks.CameraRenderer.ray_traced(samples=4)))
+    camera = sim["eye"]
+    progress = camera.progress
+    assert (progress.samples, progress.total, progress.rays, progress.fraction, progress.elapsed) == (0, 0, 0, None, None)
+    image = camera["color"]
+    # Two environments.
+    assert progress.samples == progress.total == 2 * 64 * 48 * 4 and progress.fraction == 1 and progress.remaining == 0
+    assert progress.rays > progress.samples and progress.elapsed > 0
+    assert repr(progress) == f"<RenderProgress: {progress.total} of {progress.total} paths>"
+    progress.cancel()
+    sim.update(1)
+    assert progress.is_canceled and camera.progress.is_canceled
+    with pytest.raises(ks.SensorError, match="cancel"):
+        camera["color"]  # noqa: B018
+    progress.resume()
+    assert not progress.is_canceled and camera["color"].shape == image.shape
+    # While a thread renders for minutes, another one sees the progress, and cancels it.
+    large = ks.CameraCfg(width=640, height=480, extrinsics=AHEAD, renderer=ks.CameraRenderer.ray_traced(samples=50_000))
+    camera = sim.add_sensor("large", large)
+    progress, raised = camera.progress, []
+
+    def render():
+        try:
+            camera["color"]  # noqa: B018
+        except ks.SensorError as error:
+            raised.append(str(error))
+
+    thread = threading.Thread(target=render)
+    thread.start()
+    while not progress.rays:
+        assert thread.is_alive()
+        time.sleep(0.01)
+    assert progress.total == 2 * 640 * 480 * 50_000 and 0 <= progress.fraction < 0.5 and not raised
+    progress.cancel()
+    thread.join(60)
+    assert not thread.is_alive() and len(raised) == 1 and "cancel" in raised[0]
+    with pytest.raises(ks.ArgumentError, match="not a camera"):
+        sim.add_sensor("imu", ks.ImuCfg(body="box_0")).progress  # noqa: B018

@@ -247,6 +247,21 @@ def test_handles_belong_to_their_simulation(arm_sim):
     assert twin.qpos.shape == (2, 6)
 
 
+def test_a_recording_is_played_in_a_window_of_its_own_simulation(arm_sim, tmp_path, display):
+    sim, _ = arm_sim
+    with sim.record(tmp_path / "run.npz"):
+        sim.update(3)
+    playback = ks.Playback(tmp_path / "run.npz")
+    foreign, own = sim.open_window(display=display), playback.sim.open_window(display=display)
+    with pytest.raises(ks.ForeignHandleError, match="another simulation"):
+        playback.play(foreign, timeout=60)
+    assert foreign.is_open
+    # A control: a window of the playback's own simulation, until it is closed.
+    own.close()
+    playback.play(own, timeout=60)
+    assert not own.is_open
+
+
 def test_names_and_collections(arm_sim):
     sim, arm = arm_sim
     assert sim.keys() == ["arm"] == list(sim) and len(sim) == 1 and "arm" in sim and "leg" not in sim
@@ -310,6 +325,39 @@ def test_simulations_run_at_the_same_time():
     assert longest < alone / 2
     longest, alone = longest_update(second, second)
     assert longest > alone / 2
+
+
+def longest_pause(work):
+    """Longest pause of this thread while another one works, and the duration of the work [s]."""
+    seconds = []
+
+    def timed():
+        started = time.perf_counter()
+        work()
+        seconds.append(time.perf_counter() - started)
+
+    thread = threading.Thread(target=timed)
+    longest, last = 0.0, time.perf_counter()
+    thread.start()
+    while thread.is_alive():
+        now = time.perf_counter()
+        longest, last = max(longest, now - last), now
+    return longest, seconds[0]
+
+
+def test_other_threads_run_while_a_camera_renders():
+    """The interpreter is released while a path-traced image is rendered. A control: a call of Python's own that holds it."""
+    sim = ks.SimulationManager(threads=1)
+    sim.add_rigid_object(uid="cube")
+    look = ks.Placement.look_at(eye=[2, 0, 1], target=[0, 0, 0.3])
+    cfg = ks.CameraCfg(
+        width=320, height=240, extrinsics=ks.Extrinsics(placement=look), renderer=ks.CameraRenderer.ray_traced(samples=16)
+    )
+    camera = sim.add_sensor("camera", cfg)
+    longest, seconds = longest_pause(lambda: camera["color"])
+    assert seconds > 0.5 and longest < seconds / 2, (longest, seconds)
+    longest, seconds = longest_pause(lambda: sum(range(30_000_000)))
+    assert longest > seconds / 2, (longest, seconds)
 
 
 def runnable_threads(simulations):

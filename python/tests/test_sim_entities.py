@@ -11,6 +11,7 @@ import xml.etree.ElementTree as ElementTree
 from types import MappingProxyType
 from urllib.parse import urlparse
 
+import mujoco
 import numpy as np
 import pytest
 
@@ -272,6 +273,75 @@ def test_dynamics_of_robots(fix_base, rng):
         robot.gravity_torque(np.zeros(2))
     with pytest.raises(ks.OutOfRangeError):
         robot.mass_matrix(env_ids=[3])
+
+
+@pytest.mark.parametrize("fix_base", [True, False], ids=["fixed", "floating"])
+def test_dynamics_of_moving_robots(fix_base, rng):
+    """Bias forces, inverse dynamics, centers of mass, energies and momenta against MuJoCo's own of the same model and state."""
+    gravity = np.array([0.3, -1.0, -9.0])
+    model = mujoco.MjModel.from_xml_string(LINKAGE if fix_base else LINKAGE.replace('pos="0 0 2">', 'pos="0 0 2"><freejoint/>'))
+    model.opt.gravity = gravity
+    model.opt.enableflags |= mujoco.mjtEnableBit.mjENBL_ENERGY
+    data = mujoco.MjData(model)
+    sim = ks.SimulationManager(num_envs=3, ground=None, gravity=gravity)
+    robot = sim.add_robot(uid="r", mjcf=ks.MjcfFile(text=LINKAGE), fix_base=fix_base, drive={"drive_type": "none"})
+    qpos, qvel = rng.uniform(-0.5, 0.5, (3, 3)), rng.normal(size=(3, 3))
+    robot.write_joint_state(qpos, qvel)
+    root = robot.root_state
+    if not fix_base:
+        root[:, :3] += rng.normal(size=(3, 3))
+        root[:, 3:7] = rng.normal(size=(3, 4))
+        root[:, 3:7] /= np.linalg.norm(root[:, 3:7], axis=1, keepdims=True)
+        root[:, 7:] = rng.normal(size=(3, 6))
+        robot.write_root_state(root)
+    acceleration = rng.normal(size=(3, model.nv))
+    found = {
+        "bias_force": robot.bias_force(), "inverse_dynamics": robot.inverse_dynamics(acceleration), "center_of_mass": robot.center_of_mass(),
+        "potential_energy": robot.potential_energy(), "kinetic_energy": robot.kinetic_energy(), "momentum": robot.momentum(),
+        "mass_matrix": robot.mass_matrix(),
+    }  # fmt: skip
+    for env in range(3):
+        if not fix_base:
+            data.qpos[:7] = root[env, :7]
+            # Angular velocities of a free joint are in the axes of the body.
+            turn = np.zeros(9)
+            mujoco.mju_quat2Mat(turn, root[env, 3:7])
+            data.qvel[:6] = [*root[env, 7:10], *(turn.reshape(3, 3).T @ root[env, 10:])]
+        data.qpos[-3:], data.qvel[-3:] = qpos[env], qvel[env]
+        mujoco.mj_forward(model, data)
+        mujoco.mj_subtreeVel(model, data)
+        data.qacc[:] = acceleration[env]
+        matrix = np.zeros((model.nv, model.nv))
+        for column, unit in zip(matrix, np.eye(model.nv), strict=True):
+            mujoco.mj_mulM(model, data, column, unit)
+        potential, kinetic = data.energy
+        mujoco.mj_inverse(model, data)
+        expected = {
+            "bias_force": data.qfrc_bias, "inverse_dynamics": data.qfrc_inverse, "center_of_mass": data.subtree_com[1],
+            "potential_energy": potential, "kinetic_energy": kinetic, "mass_matrix": matrix,
+            "momentum": [*(model.body_subtreemass[1] * data.subtree_linvel[1]), *data.subtree_angmom[1]],
+        }  # fmt: skip
+        for name, value in expected.items():
+            np.testing.assert_allclose(found[name][env], value, rtol=1e-9, atol=1e-9, err_msg=name)
+    # At given positions and velocities, of chosen environments, against the state itself. Controls: others are others.
+    at = {"qpos": qpos[1:], "qvel": qvel[1:], "env_ids": [1, 2]}
+    np.testing.assert_array_equal(robot.inverse_dynamics(acceleration[1:], **at), found["inverse_dynamics"][1:])
+    for name in ("bias_force", "kinetic_energy", "momentum"):
+        np.testing.assert_array_equal(getattr(robot, name)(**at), found[name][1:])
+        assert (getattr(robot, name)(qpos=qpos, qvel=2 * qvel) != found[name]).any()
+    for name in ("center_of_mass", "potential_energy"):
+        np.testing.assert_array_equal(getattr(robot, name)(qpos[1:], env_ids=[1, 2]), found[name][1:])
+        assert (getattr(robot, name)(np.zeros(3)) != found[name]).any()
+    for call, text in (
+        (lambda: robot.bias_force(qvel=np.zeros(2)), r"bias_force: qvel has the shape \[1, 2\]"),
+        (lambda: robot.inverse_dynamics(np.zeros(2)), "inverse_dynamics: qacc has the shape"),
+        (lambda: robot.kinetic_energy(qvel=[np.nan] * 3), "kinetic_energy: qvel must not contain NaN"),
+        (lambda: robot.momentum(np.zeros((2, 3))), "momentum: qpos has the shape"),
+    ):
+        with pytest.raises(ks.ArgumentError, match=text):
+            call()
+    with pytest.raises(ks.OutOfRangeError):
+        robot.momentum(env_ids=[3])
 
 
 def test_reports_of_robots():

@@ -78,7 +78,7 @@ def test_programs_of_the_page(tmp_path, monkeypatch, capsys, display):
     for old, new in changes.items():
         assert any(old in block for block in blocks), old
         blocks = [block.replace(old, new) for block in blocks]
-    first, configurations, recordings, windows, segmentation = blocks
+    first, configurations, recordings, buttons, windows, segmentation = blocks
     names = {}
     exec(first, names)  # noqa: S102
     assert names["arm"].qpos.shape == (2, 6) and names["cam"]["depth"].shape == (2, 24, 32)
@@ -93,6 +93,8 @@ def test_programs_of_the_page(tmp_path, monkeypatch, capsys, display):
     names["sim"].reset()
     exec(recordings, names)  # noqa: S102
     assert names["stream"].clients == 0 and (tmp_path / "run.mcap").is_file()
+    exec(buttons, names)  # noqa: S102
+    assert names["page"].url.startswith("http://127.0.0.1:") and not names["files"].is_recording
     exec(windows, names)  # noqa: S102
     assert names["view"].wait(20)
     exec(segmentation, names)  # noqa: S102

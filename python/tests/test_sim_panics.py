@@ -14,12 +14,13 @@ VALUES = {
     "actions": [[0.0]], "body": "cube", "camera": lambda world: world["Sensor"], "channel": "depth", "controls": [[[0.0]]],
     "drive_type": "force", "entity": "cube", "env": 0, "eye": [1.0, 0, 0], "field": "x", "folder": lambda world: world["folder"],
     "force": [0.0] * 3, "forces": [0.0] * 3, "frame": 0, "group": "policy", "image": np.zeros((2, 2, 3), np.uint8),
-    "intrinsics": [[1.0] * 4], "left": [[1.0] * 4], "link": "cart", "mask": np.zeros((1, 2, 2), np.int32), "name": "cube", "on": True,
+    "intrinsics": [[1.0] * 4], "joint": 0, "left": [[1.0] * 4], "link": "cart", "mask": np.zeros((1, 2, 2), np.int32), "name": "cube", "on": True,
     "one": "cube", "other": "cart", "path": lambda world: world["folder"] / "x.npz", "patterns": ".*", "poses": [[0.0] * 7],
-    "positions": [[0.0]], "property": "mass", "qpos": [[0.0]], "randomization": [], "right": [[1.0] * 4], "seconds": 0.01,
+    "positions": [[0.0]], "property": "mass", "qacc": [[0.0]], "qpos": [[0.0]], "randomization": [],
+    "record_button": lambda world: world["FileRecording"], "robot": lambda world: world["Robot"], "right": [[1.0] * 4], "seconds": 0.01,
     "sensor": lambda world: world["Sensor"], "shown": True, "site": "x", "snapshot": lambda world: world["Snapshot"], "speed": 1.0,
     "target": [0.0] * 3, "targets": [[0.0] * 7], "text": "a note", "time": 0.5, "tip": "cart", "topic": "x", "torque": [0.0] * 3,
-    "torques": [0.0] * 3, "uid": "cube", "values": [0.0], "velocities": [[0.0]], "x": 0.0, "y": 0.0,
+    "torques": [0.0] * 3, "uid": "cube", "value": 0.0, "values": [0.0], "velocities": [[0.0]], "x": 0.0, "y": 0.0,
 }  # fmt: skip
 # Parameters with another value in one method.
 OWN = {
@@ -32,6 +33,7 @@ PLAIN = {
     "ImageWindow": "close frame_count is_open __enter__ __exit__ __repr__",
     "Playback": "sim",
     "Recorder": "path __repr__ __enter__",
+    "RenderProgress": "cancel fraction is_canceled rays resume samples total __repr__",
     "Robot": "kind",
     "Segmentation": "__repr__",
     "Sensor": "uid",
@@ -59,8 +61,8 @@ def world_of(folder, display):
         sim.update(2)
     world = {
         "folder": folder, "SimulationManager": sim, "Robot": cart, "RigidObject": cube, "RigidObjectGroup": group, "Terrain": terrain,
-        "MjcfPart": part, "Sensor": camera, "Segmentation": sim.segmentation(), "Snapshot": sim.snapshot(),
-        "Recorder": sim.record(folder / "new.npz", overwrite=True), "FoxgloveServer": sim.stream_to_foxglove("127.0.0.1:0"),
+        "MjcfPart": part, "Sensor": camera, "RenderProgress": camera.progress, "Segmentation": sim.segmentation(), "Snapshot": sim.snapshot(),
+        "Recorder": sim.record(folder / "new.npz", overwrite=True), "FileRecording": sim.file_recording(folder / "files.npz"), "FoxgloveServer": sim.stream_to_foxglove("127.0.0.1:0"),
         "Server": sim.serve(), "Viewer": sim.viewer(), "Window": sim.open_window(display=display),
         "ImageWindow": ks.ImageWindow(display=display), "Playback": ks.Playback(path, sim), "Weld": weld,
     }  # fmt: skip

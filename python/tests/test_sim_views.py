@@ -106,3 +106,147 @@ def test_a_recording_plays_in_real_time(tmp_path, display):
     window.close()
     thread.join(20)
     assert not thread.is_alive()
+
+
+def step_until(sim, condition):
+    """Steps until a condition, at most 20 s."""
+
+    def is_true():
+        if condition():
+            return True
+        sim.update(1)
+        return False
+
+    until(is_true)
+
+
+def published(viewer, sim, condition):
+    """Steps until the published state fulfills a condition, and returns it."""
+    step_until(sim, lambda: condition(viewer.state))
+    return viewer.state
+
+
+def test_the_record_button_writes_files(arm_sim, tmp_path, display):
+    """Each press starts a new file, here by a viewer. The judge is the motion that the program saw."""
+    sim, arm = arm_sim
+    files = sim.file_recording(ks.RecorderCfg(path=tmp_path / "run.npz", topics=[ks.Topic.joint_states("arm")]))
+    assert repr(files) == "<FileRecording: no recording yet>" and files.finish() == [] and not files.is_recording
+    viewer = sim.viewer()
+    # Without a button, the command is refused.
+    assert viewer.state["recording"] is None
+    viewer.record()
+    assert "button" in published(viewer, sim, lambda state: state["refusal"])["refusal"]
+    window = sim.open_window(display=display, speed=None, record_button=files)
+    assert published(viewer, sim, lambda state: state["recording"])["recording"] == {"on": False, "text": ""}
+    seen = []
+    for number, target in enumerate((0.2, -0.1)):
+        arm.set_qpos_target([target] * 6)
+        viewer.record()
+        step_until(sim, lambda: files.is_recording)
+        assert files.failure is None and repr(files).startswith("<FileRecording, recording: run")
+        positions = [arm.qpos]
+        for _ in range(9 + number):
+            sim.update(1)
+            positions.append(arm.qpos)
+        seen.append(np.array(positions))
+        viewer.record(False)
+        step_until(sim, lambda: not files.is_recording)
+    assert published(viewer, sim, lambda state: "MB" in state["recording"]["text"])["recording"]["on"] is False
+    summaries = files.finish()
+    assert [summary.path.name for summary in summaries] == ["run.npz", "run-2.npz"] and files.finish() == []
+    for positions, summary in zip(seen, summaries, strict=True):
+        recorded = np.load(summary.path)["arm/joint_states/positions"]
+        # Commands are handled some steps later.
+        starts = range(len(recorded) - len(positions) + 1)
+        assert sum((recorded[start : start + len(positions)] == positions).all() for start in starts) == 1, recorded.shape
+    # A program records by the same object, to exactly the file of the configuration, which exists now.
+    with pytest.raises(ks.RecordingError, match="exists"):
+        files.start()
+    other = sim.file_recording(tmp_path / "own.npz")
+    other.start()
+    sim.update(3)
+    assert [summary.path.name for summary in other.finish()] == ["own.npz"]
+    # Another button replaces it; the view of a browser has it too.
+    server = sim.serve(record_button=other)
+    viewer.record()
+    step_until(sim, lambda: other.is_recording)
+    assert not files.is_recording
+    sim.set_record_button(files)
+    sim.update(1)
+    assert not other.is_recording
+    assert [summary.path.name for summary in other.finish()] == ["own-2.npz"]
+    server.close()
+    window.close()
+    with ks.SimulationManager() as foreign:
+        for call in (
+            lambda: foreign.set_record_button(files),
+            lambda: foreign.serve(record_button=files),
+            lambda: foreign.open_window(display=display, record_button=files),
+        ):
+            with pytest.raises(ks.ForeignHandleError, match="record button belongs to another simulation"):
+                call()
+    with pytest.raises(ks.ConfigError, match="file_path"):
+        sim.file_recording({"file_path": "run.npz"})
+
+
+def test_viewers_set_targets_and_pull(arm_sim):
+    sim, arm = arm_sim
+    viewer = sim.viewer()
+    viewer.set_target(arm, "JOINT3", -0.25, env=1)
+    viewer.set_target(arm, 1, 0.5)
+    expected = np.array([[0, 0.5, 0, 0, 0, 0], [0, 0.5, -0.25, 0, 0, 0]])
+    step_until(sim, lambda: (arm.qpos_target == expected).all())
+    # A paused simulation waits in update.
+    viewer.toggle_pause()
+    thread = threading.Thread(target=sim.update, args=(1000,))
+    thread.start()
+    until(lambda: viewer.state["paused"])
+    time.sleep(0.2)
+    assert thread.is_alive()
+    viewer.toggle_pause()
+    thread.join(20)
+    assert not thread.is_alive() and not published(viewer, sim, lambda state: not state["paused"])["paused"]
+    with ks.SimulationManager() as foreign:
+        twin = foreign.add_robot(ks.bundled_robot("sr5", uid="arm"))
+        for call, error, text in (
+            (lambda: viewer.set_target(twin, 0, 0.0), ks.ForeignHandleError, "another simulation"),
+            (lambda: viewer.set_target(arm, 6, 0.0), ks.OutOfRangeError, "joint 6 does not exist; there are 6"),
+            (lambda: viewer.set_target(arm, "JOIN1", 0.0), ks.UnknownNameError, "JOINT1"),
+            (lambda: viewer.set_target(arm, 0, np.nan), ks.ArgumentError, "not a finite position"),
+            (lambda: viewer.set_target(arm, 0, 0.0, env=2), ks.OutOfRangeError, "environment 2"),
+            (lambda: viewer.drag("arm/lnk3", [0, 0, 1]), ks.UnknownNameError, "arm/link3"),
+            (lambda: viewer.drag("arm/link3", [0, np.inf, 1]), ks.ArgumentError, "target"),
+            (lambda: viewer.drag("arm/link3", [0, 0, 1], anchor=[np.nan, 0, 0]), ks.ArgumentError, "anchor"),
+            (lambda: viewer.drag("arm/link3", [0, 0, 1], env=2), ks.OutOfRangeError, "environment 2"),
+        ):
+            with pytest.raises(error, match=text):
+                call()
+
+
+def is_steady(sim, body):
+    """True if the velocity of a body in environment 1 stays for a step."""
+    before = body.velocity[1]
+    sim.update(1)
+    return (body.velocity[1] == before).all()
+
+
+def test_a_viewer_pulls_a_body_with_a_spring():
+    """A free body reaches the target of the spring in one environment; after the release, and in the other, it goes straight on."""
+    sim = ks.SimulationManager(num_envs=2, threads=1, ground=None, gravity=[0, 0, 0])
+    cube = sim.add_rigid_object(uid="cube")
+    start = cube.pose[:, :3]
+    viewer = sim.viewer()
+    viewer.drag("cube", start[1] + [0.2, 0, 0], env=1)
+    step_until(sim, lambda: cube.velocity[1, 0] > 0)
+    sim.update(300)
+    np.testing.assert_allclose(cube.pose[1, :3], start[1] + [0.2, 0, 0], atol=0.01)
+    np.testing.assert_array_equal(cube.pose[0, :3], start[0])
+    viewer.drag("cube", start[1] - [20, 0, 0], env=1)
+    step_until(sim, lambda: cube.velocity[1, 0] < -0.01)
+    viewer.release()
+    step_until(sim, lambda: is_steady(sim, cube))
+    velocity, before = cube.velocity[1, :3], cube.pose[1, :3]
+    assert velocity[0] < -0.01
+    sim.update(10)
+    np.testing.assert_allclose(cube.velocity[1, :3], velocity, atol=1e-9)
+    np.testing.assert_allclose(cube.pose[1, :3], before + 10 * sim.physics_dt * velocity, atol=1e-9)

@@ -19,6 +19,7 @@ preload()
 
 from . import cfg, errors  # noqa: E402
 from ._sim import (  # noqa: E402
+    FileRecording,
     FoxgloveServer,
     IkResult,
     ImageWindow,
@@ -26,6 +27,7 @@ from ._sim import (  # noqa: E402
     Playback,
     Recorder,
     RecordingSummary,
+    RenderProgress,
     RigidObject,
     RigidObjectGroup,
     Robot,
@@ -86,6 +88,7 @@ def __dir__() -> list[str]:
 __all__ = [
     "BatchRenderer",
     "Diagnostic",
+    "FileRecording",
     "FoxgloveServer",
     "IkResult",
     "ImageWindow",
@@ -93,6 +96,7 @@ __all__ = [
     "Playback",
     "Recorder",
     "RecordingSummary",
+    "RenderProgress",
     "Renderer",
     "RigidObject",
     "RigidObjectGroup",

@@ -1,5 +1,6 @@
 """Types of the extension module. A test compares them with the module, and the documentation with that of the module
-(``python/tests/stub_docs.py`` writes it). The classes of entities are in ``_sim_entities.pyi``."""
+(``python/tests/stub_docs.py`` writes it). The classes of entities are in ``_sim_entities.pyi``,
+those of views in ``_sim_views.pyi``."""
 
 import os
 from collections.abc import Iterator, Mapping, Sequence
@@ -12,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from ._sim_entities import (
     IkResult,
     MjcfPart,
+    RenderProgress,
     RigidObject,
     RigidObjectGroup,
     Robot,
@@ -24,6 +26,7 @@ from ._sim_entities import (
     _Fields,
     _Numbers,
 )
+from ._sim_views import FileRecording, ImageWindow, Server, Viewer, Window
 from .cfg import (
     ActuatorStateCfg,
     ArticulationCfg,
@@ -90,6 +93,7 @@ _EntityCfg: TypeAlias = (
 _Handle: TypeAlias = MjcfPart | RigidObject | RigidObjectGroup | Robot | Sensor | Terrain | Weld
 
 __all__ = [
+    "FileRecording",
     "FoxgloveServer",
     "IkResult",
     "ImageWindow",
@@ -97,6 +101,7 @@ __all__ = [
     "Playback",
     "Recorder",
     "RecordingSummary",
+    "RenderProgress",
     "RigidObject",
     "RigidObjectGroup",
     "Robot",
@@ -198,34 +203,6 @@ class FoxgloveServer:
         """Disconnects all clients and stops listening."""
 
 @final
-class ImageWindow:
-    """A window for images that the program computes, such as the channels of a camera. It has a thread of its own,
-    so it stays responsive while the program computes. It closes with ``close``, or when the object is dropped.
-    """
-
-    def __new__(cls, title: str | None = None, size: Sequence[int] | NDArray[Any] | None = None, *, display: str | None = None) -> Self: ...
-    @property
-    def failure(self) -> str | None:
-        """Error that closed the window, such as a lost display; None if it is open or was closed as intended."""
-    @property
-    def frame_count(self) -> int:
-        """Number of frames sent to the display."""
-    @property
-    def is_open(self) -> bool:
-        """True while the window is open."""
-    def __enter__(self, /) -> Self: ...
-    def __exit__(self, /, *_exception: object) -> None: ...
-    def __repr__(self) -> str: ...
-    def close(self, /) -> None:
-        """Requests the window to close, without waiting."""
-    def show(self, /, image: ArrayLike) -> None:
-        """Replaces the image and returns at once: uint8, shape (height, width, 4) or (height, width, 3). It is
-        scaled to fit into the window. Without effect after the window was closed.
-        """
-    def wait(self, /, timeout: float | None = None) -> bool:
-        """Waits until the window is closed, at most ``timeout`` seconds, and returns True if it is."""
-
-@final
 class Playback:
     """Playback of a recording: ``seek`` puts the simulation ``sim`` into the state of a recorded frame."""
 
@@ -245,8 +222,9 @@ class Playback:
         """Index of the last frame at or before a time [s]; 0 before the first."""
     def play(self, /, window: Window | None = None, timeout: float | None = None) -> None:
         """Shows the recording in the windows and browser views of ``sim``, from the first frame in real time.
-        Viewers pause it, seek, show single frames and change the speed. Returns when ``window`` is closed, after
-        ``timeout`` seconds, or with ``KeyboardInterrupt`` on Ctrl+C. Other calls of ``sim`` wait meanwhile.
+        Viewers pause it, seek, show single frames and change the speed. Returns when ``window``, a window of
+        ``sim``, is closed, after ``timeout`` seconds, or with ``KeyboardInterrupt`` on Ctrl+C. Other calls of
+        ``sim`` wait meanwhile.
         """
     def seek(self, /, frame: int) -> None:
         """Shows a frame, by its index in ``times``."""
@@ -294,20 +272,6 @@ class RecordingSummary:
     def waits(self) -> int:
         """Number of times that the simulation waited for the writer."""
     def __repr__(self) -> str: ...
-
-@final
-class Server:
-    """A browser view of a simulation."""
-
-    @property
-    def url(self) -> str:
-        """Address to open in a browser."""
-    @property
-    def viewers(self) -> int:
-        """Number of connected browsers."""
-    def __repr__(self) -> str: ...
-    def close(self, /) -> None:
-        """Disconnects all browsers and stops listening."""
 
 @final
 class SimulationManager:
@@ -431,9 +395,15 @@ class SimulationManager:
         """Value of a property of a link, object or joint in the model as it was compiled, which ``reset_properties``
         returns to.
         """
-    def open_window(self, /, title: str | None = None, size: Sequence[int] | NDArray[Any] | None = None, *, speed: float | None = 1.0, display: str | None = None, cfg: WindowCfg | _Fields | None = None) -> Window:
+    def file_recording(self, /, path: str | os.PathLike[str] | RecorderCfg | _Fields) -> FileRecording:
+        """Recording to files for a record button: for ``open_window``, ``serve`` and ``set_record_button``. ``path``
+        is a path such as ``"run.mcap"``, after which the button writes ``run-2.mcap`` and so on, or a
+        ``RecorderCfg``. Existing files are not overwritten unless the configuration allows it.
+        """
+    def open_window(self, /, title: str | None = None, size: Sequence[int] | NDArray[Any] | None = None, *, speed: float | None = 1.0, display: str | None = None, record_button: FileRecording | None = None, cfg: WindowCfg | _Fields | None = None) -> Window:
         """Opens a window that shows the simulation while it steps, in real time unless ``speed`` is another factor,
-        or None for no limit. ``cfg`` is a ``WindowCfg``, in place of the other arguments. Raises ``ViewerError``
+        or None for no limit. ``record_button`` is the ``file_recording`` that the record button starts and stops.
+        ``cfg`` is a ``WindowCfg``, in place of the arguments before ``record_button``. Raises ``ViewerError``
         without a display.
         """
     def property(self, /, property: Property, name: str) -> _Array:
@@ -482,13 +452,18 @@ class SimulationManager:
         pattern of names, ``{"arm": "manipulator", "cube_.*": "target"}``, or a ``SegmentationCfg``; other entities
         keep their own class. Call it again after entities were added.
         """
-    def serve(self, /, address: str = "127.0.0.1:0", *, speed: float | None = None, max_fps: float | None = None, max_viewers: int | None = None, jpeg_quality: int | None = None, allow_local_frames: bool | None = None, cfg: ServeCfg | _Fields | None = None) -> Server:
+    def serve(self, /, address: str = "127.0.0.1:0", *, speed: float | None = None, max_fps: float | None = None, max_viewers: int | None = None, jpeg_quality: int | None = None, allow_local_frames: bool | None = None, record_button: FileRecording | None = None, cfg: ServeCfg | _Fields | None = None) -> Server:
         """Serves the simulation to browsers; port 0 selects a free port. ``cfg`` is a ``ServeCfg``; keyword
         arguments replace its fields. ``speed`` is simulated seconds per second. ``allow_local_frames`` lets web
-        pages of this machine show the view in a frame, as notebooks do.
+        pages of this machine show the view in a frame, as notebooks do. ``record_button`` is the ``file_recording``
+        that the record button starts and stops.
         """
     def set_camera_view(self, /, eye: _Numbers, target: _Numbers) -> None:
         """Sets the view of windows, browser views and screenshots [m]."""
+    def set_record_button(self, /, record_button: FileRecording) -> None:
+        """Sets the record button of all windows and browser views, which ``Viewer.record`` presses too. The
+        recording of the button before is stopped.
+        """
     def set_property(self, /, property: Property, name: str, values: ArrayLike, env_ids: _Envs = None) -> None:
         """Sets a property of a link, object or joint: one row for each of ``env_ids``, or one for all."""
     def show(self, /, width: int = 960, height: int = 540) -> Frame:
@@ -673,59 +648,3 @@ class Topic:
     @staticmethod
     def task_results() -> Topic:
         """Rewards and ends of episodes."""
-
-@final
-class Viewer:
-    """A viewer that is a program, made by ``SimulationManager.viewer``: it pauses, steps and paces the simulation,
-    while another thread steps it by ``update``, which handles commands after each step. Its pause and speed end with
-    ``close``. While ``Playback.play`` shows a recording, the commands are for the recording.
-    """
-
-    @property
-    def state(self) -> dict[str, Any]:
-        """State of the simulation when it last published one, at most 30 times per second: a dict of ``steps`` since
-        the simulation was created, ``paused``, ``speed`` (None for no limit), ``measured_speed`` (simulated seconds
-        per second, or None), ``refusal``, the reason of the last refused command, or None, and ``timeline``, a dict
-        of ``time``, ``start`` and ``end`` [s] while ``Playback.play`` shows a recording, otherwise None. ``steps``
-        is then the index of the frame.
-        """
-    def __enter__(self, /) -> Self: ...
-    def __exit__(self, /, *_exception: object) -> None: ...
-    def __repr__(self) -> str: ...
-    def close(self, /) -> None:
-        """Ends the viewer, its pause and its speed. A second call does nothing."""
-    def pause(self, /) -> None:
-        """Pauses the simulation: ``update`` waits until any viewer resumes it, or this one is closed."""
-    def reset(self, /, env: int | None = None) -> None:
-        """Resets an environment, or all, after the next step."""
-    def resume(self, /) -> None:
-        """Resumes the simulation, whichever viewer paused it."""
-    def seek(self, /, time: float) -> None:
-        """Shows the frame of a recording at a time [s], while ``Playback.play`` shows it; a time outside shows its
-        first or last frame.
-        """
-    def set_speed(self, /, speed: float | None) -> None:
-        """Sets the speed: simulated seconds per second, from 0.001 to 1000, or None for no limit."""
-    def step(self, /, steps: int = 1) -> None:
-        """Runs this many steps inside the calls of ``update``, then pauses."""
-
-@final
-class Window:
-    """A window of a simulation."""
-
-    @property
-    def failure(self) -> str | None:
-        """Error that closed the window, such as a lost display; None if it is open or was closed as intended."""
-    @property
-    def frame_count(self) -> int:
-        """Number of frames sent to the display."""
-    @property
-    def is_open(self) -> bool:
-        """True while the window is open."""
-    def __repr__(self) -> str: ...
-    def close(self, /) -> None:
-        """Requests the window to close, without waiting."""
-    def wait(self, /, timeout: float | None = None) -> bool:
-        """Waits until the window is closed, at most ``timeout`` seconds, and returns True if it is. The user, a call
-        of ``close`` or the end of the simulation closes it.
-        """

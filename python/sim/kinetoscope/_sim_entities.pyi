@@ -192,6 +192,41 @@ class RigidObjectGroup:
         """Writes velocities, shape (num_envs, objects, 6)."""
 
 @final
+class RenderProgress:
+    """Progress of the path tracing of a camera, made by ``Sensor.progress``. Another thread can watch and cancel a
+    read of the camera: the values do not wait for the simulation.
+    """
+
+    @property
+    def elapsed(self) -> float | None:
+        """Time since the start of the path tracing [s], also after its end; None before the first."""
+    @property
+    def fraction(self) -> float | None:
+        """Finished fraction, 0 to 1; None without any paths."""
+    @property
+    def is_canceled(self) -> bool:
+        """True after ``cancel``, until ``resume``."""
+    @property
+    def rays(self) -> int:
+        """Number of rays, for the paths themselves and for shadows."""
+    @property
+    def remaining(self) -> float | None:
+        """Estimated time left [s], at the mean speed so far; None before the first path."""
+    @property
+    def samples(self) -> int:
+        """Number of paths of the images that are traced so far."""
+    @property
+    def total(self) -> int:
+        """Number of paths of the images: pixels times samples."""
+    def __repr__(self) -> str: ...
+    def cancel(self, /) -> None:
+        """Cancels the current path tracing, whose read raises ``SensorError``, and any that starts before
+        ``resume``.
+        """
+    def resume(self, /) -> None:
+        """Allows path tracing again. The camera renders canceled images when they are read again."""
+
+@final
 class Robot:
     """A robot or a passive articulation in all environments.
 
@@ -385,6 +420,34 @@ class Robot:
         """Indices of the links whose names match a pattern, or one of several."""
     def jacobian(self, /, tip: str, qpos: ArrayLike | None = None, link: str | None = None, tcp: _Numbers | None = None, env_ids: _Envs = None) -> _Array:
         """Jacobians of a frame, shape (num_envs, 6, joints); at the current positions without ``qpos``."""
+    def bias_force(self, /, qpos: ArrayLike | None = None, qvel: ArrayLike | None = None, env_ids: _Envs = None) -> _Array:
+        """Generalized forces at zero acceleration, c(q, v) + g(q) of the equation of motion [N m or N],
+        ``qfrc_bias`` of MuJoCo, shape (num_envs, columns), with the columns of ``mass_matrix``. Joint positions and
+        velocities are the current ones by default; a floating base has its current pose and velocity. Velocities of
+        mimic joints are used as given.
+        """
+    def center_of_mass(self, /, qpos: ArrayLike | None = None, env_ids: _Envs = None) -> _Array:
+        """Centers of mass of the robot in the environment [m], shape (num_envs, 3), at joint positions, by default
+        the current ones.
+        """
+    def inverse_dynamics(self, /, qacc: ArrayLike, qpos: ArrayLike | None = None, qvel: ArrayLike | None = None, env_ids: _Envs = None) -> _Array:
+        """Generalized forces M a + c + g that produce accelerations, shape (num_envs, columns), with the columns of
+        ``mass_matrix`` [N m or N], rotor inertias included. Accelerations are the rates of change of the velocities
+        of these columns, shape (num_envs, columns) [rad/s² or m/s²]. Damping and friction of joints are not
+        included. Joint positions and velocities are those of ``bias_force``.
+        """
+    def kinetic_energy(self, /, qpos: ArrayLike | None = None, qvel: ArrayLike | None = None, env_ids: _Envs = None) -> _Array:
+        """Kinetic energies [J], rotor inertias included, shape (num_envs,). Joint positions and velocities are those
+        of ``bias_force``.
+        """
+    def momentum(self, /, qpos: ArrayLike | None = None, qvel: ArrayLike | None = None, env_ids: _Envs = None) -> _Array:
+        """Momenta of the links in the axes of the environment, shape (num_envs, 6): linear [kg m/s], then angular
+        about the center of mass [kg m²/s]. Joint positions and velocities are those of ``bias_force``.
+        """
+    def potential_energy(self, /, qpos: ArrayLike | None = None, env_ids: _Envs = None) -> _Array:
+        """Potential energies in the gravity of the simulation [J], zero at the origin of the environment, shape
+        (num_envs,), at joint positions, by default the current ones.
+        """
     def gravity_torque(self, /, qpos: ArrayLike | None = None, env_ids: _Envs = None) -> _Array:
         """Generalized forces that hold the robot still against gravity at joint positions, by default the current
         ones [N m or N], shape (num_envs, columns), with the columns of ``mass_matrix``. Gravity itself exerts the
@@ -546,6 +609,21 @@ class Sensor:
     def __repr__(self) -> str: ...
     def __str__(self) -> str: ...
     def _repr_html_(self, /) -> str: ...
+    @property
+    def latest_delivered_intrinsic_matrices(self) -> _Array:
+        """Intrinsic matrices of a camera at the delivery of the latest delivered images [pixels], shape (num_envs,
+        3, 3). Without a latency, they equal ``intrinsic_matrices``.
+        """
+    @property
+    def progress(self) -> RenderProgress:
+        """Progress of the path tracing of a camera, and a way to cancel it from another thread; of a pair, those of
+        the left camera.
+        """
+    def latest_delivered_pose_w(self, /, convention: _Axes = "ros") -> _Array:
+        """Poses of a camera in the environment at the latest delivered images, as ``pose_w``, shape (num_envs, 7):
+        the pose of the parent at the capture, and the local pose at the delivery. Without a latency, they equal
+        ``pose_w``.
+        """
     @property
     def latest_delivered_stamps(self) -> _Array:
         """Capture times of the latest delivered images of a camera [s], shape (num_envs,)."""

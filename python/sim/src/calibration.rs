@@ -3,7 +3,7 @@
 use crate::arguments::{array, env_indices};
 use crate::channels::Instant;
 use crate::errors::{Class, Failure};
-use crate::sensor::{Sensor, camera_of, id_of, intrinsics_of, not_a_camera, sampled};
+use crate::sensor::{Sensor, axes, camera_of, id_of, intrinsics_of, not_a_camera, sampled};
 use crate::shared::{detached, guarded};
 use crate::values::Values;
 use kinetoscope::ndarray::{Array1, Array2, Array3, Ix2};
@@ -98,6 +98,24 @@ impl Sensor {
         Ok(stamps.into_python(py))
     }
 
+    /// Poses of a camera in the environment at the latest delivered images, as ``pose_w``, shape (num_envs, 7): the pose of the
+    /// parent at the capture, and the local pose at the delivery. Without a latency, they equal ``pose_w``.
+    #[pyo3(signature = (convention="ros"))]
+    fn latest_delivered_pose_w<'py>(&self, py: Python<'py>, convention: &str) -> PyResult<Bound<'py, PyAny>> {
+        let convention = axes(convention)?;
+        let poses: Values<'_> = self.of_camera(py, |camera| Ok(camera.latest_delivered_pose_w(convention).into()))?;
+        Ok(poses.into_python(py))
+    }
+
+    /// Intrinsic matrices of a camera at the delivery of the latest delivered images [pixels], shape (num_envs, 3, 3). Without a
+    /// latency, they equal ``intrinsic_matrices``.
+    #[getter]
+    fn latest_delivered_intrinsic_matrices<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let matrices: Values<'_> =
+            self.of_camera(py, |camera| Ok(camera.latest_delivered_intrinsic_matrices().into()))?;
+        Ok(matrices.into_python(py))
+    }
+
     /// Capture times of the measurements in the history [s], newest first, shape (num_envs, history); 0 for entries that are
     /// not filled yet.
     #[getter]
@@ -115,7 +133,7 @@ impl Sensor {
 
 impl Sensor {
     /// Reads from the camera; of a pair, the left one.
-    fn of_camera<T: Send>(
+    pub(crate) fn of_camera<T: Send>(
         &self,
         py: Python<'_>,
         act: impl FnOnce(&Camera) -> Result<T, Failure> + Send,

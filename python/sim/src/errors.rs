@@ -206,11 +206,6 @@ impl Failure {
     pub(crate) fn broken() -> Self {
         Self::new(Class::Internal, BROKEN)
     }
-
-    /// True for [`broken`](Self::broken).
-    pub(crate) fn is_broken(&self) -> bool {
-        self.message == BROKEN
-    }
 }
 
 /// Message of a simulation that is not usable any more.

@@ -143,6 +143,14 @@ impl RecordingSummary {
     }
 }
 
+impl From<record::RecordingSummary> for RecordingSummary {
+    fn from(summary: record::RecordingSummary) -> Self {
+        let text = summary.to_string();
+        let record::RecordingSummary { path, bytes, packets, waits, left_out, .. } = summary;
+        Self { path, bytes, packets, waits, left_out, text }
+    }
+}
+
 impl Recorder {
     fn finish_once(&self, py: Python<'_>) -> PyResult<RecordingSummary> {
         let summary = self.shared.write(py, |sim| {
@@ -151,9 +159,7 @@ impl Recorder {
             self.finished.store(true, Ordering::Relaxed);
             Ok(finished?)
         })?;
-        let text = summary.to_string();
-        let record::RecordingSummary { path, bytes, packets, waits, left_out, .. } = summary;
-        Ok(RecordingSummary { path, bytes, packets, waits, left_out, text })
+        Ok(summary.into())
     }
 }
 
@@ -233,10 +239,7 @@ impl Simulation {
         overview_size: Option<[usize; 2]>,
         overview_fps: Option<f64>,
     ) -> PyResult<Recorder> {
-        let base = match path.extract::<PathBuf>() {
-            Ok(path) => RecorderCfg::new(path),
-            Err(_) => cfg::read("RecorderCfg", Some(path))?,
-        };
+        let base = recorder_cfg(path)?;
         let cfg = RecorderCfg {
             format: format.map(format_of).transpose()?.or(base.format),
             topics: topics.map_or(Ok(base.topics), topics_of)?,
@@ -261,7 +264,7 @@ impl Simulation {
     /// the call after the current step.
     fn verify_recording<'py>(&self, py: Python<'py>, path: PathBuf) -> PyResult<Bound<'py, PyDict>> {
         let result = interruptible(py, |stop| {
-            self.shared.write_detached(|sim| Ok(record::replay::verify_until(stop, sim, path)?))
+            self.shared.write_detached(stop, |sim| Ok(record::replay::verify_until(stop, sim, path)?))
         })?;
         let dict = PyDict::new(py);
         dict.set_item("identical", result.is_identical())?;
@@ -269,6 +272,14 @@ impl Simulation {
         dict.set_item("values", result.values)?;
         dict.set_item("difference", result.difference.map(|difference| format!("{difference:?}")))?;
         Ok(dict)
+    }
+}
+
+/// Configuration of an argument: a path, a ``RecorderCfg``, or a dict of its fields.
+pub(crate) fn recorder_cfg(path: &Bound<'_, PyAny>) -> PyResult<RecorderCfg> {
+    match path.extract::<PathBuf>() {
+        Ok(path) => Ok(RecorderCfg::new(path)),
+        Err(_) => cfg::read("RecorderCfg", Some(path)),
     }
 }
 
@@ -495,14 +506,20 @@ impl Playback {
     }
 
     /// Shows the recording in the windows and browser views of ``sim``, from the first frame in real time. Viewers pause it, seek,
-    /// show single frames and change the speed. Returns when ``window`` is closed, after ``timeout`` seconds, or with
-    /// ``KeyboardInterrupt`` on Ctrl+C. Other calls of ``sim`` wait meanwhile.
+    /// show single frames and change the speed. Returns when ``window``, a window of ``sim``, is closed, after ``timeout``
+    /// seconds, or with ``KeyboardInterrupt`` on Ctrl+C. Other calls of ``sim`` wait meanwhile.
     #[pyo3(signature = (window=None, timeout=None))]
     fn play(&self, py: Python<'_>, window: Option<&Bound<'_, Window>>, timeout: Option<f64>) -> PyResult<()> {
         let (longest, started) = (time_limit(timeout, "timeout")?, Instant::now());
-        let window = window.map(|window| &window.get().inner);
+        let window = window.map(|window| window.get());
+        if window.is_some_and(|window| !Arc::ptr_eq(&window.shared, &self.shared)) {
+            let message = "play: the window shows another simulation; give a window of the attribute sim of this playback, \
+                           opened by sim.open_window()";
+            return Err(Failure::new(Class::ForeignHandle, message).into());
+        }
+        let window = window.map(|window| &window.inner);
         interruptible(py, |stop| {
-            self.shared.write_detached(|sim| {
+            self.shared.write_detached(stop, |sim| {
                 let mut playback = self.lock();
                 let mut goes_on = || {
                     let is_open = window.is_none_or(kinetoscope::viewer::Window::is_open);

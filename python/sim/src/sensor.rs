@@ -494,7 +494,7 @@ pub(crate) fn not_a_camera(uid: &str) -> Failure {
     Failure::argument(uid, "this sensor is not a camera")
 }
 
-fn axes(name: &str) -> PyResult<CameraConvention> {
+pub(crate) fn axes(name: &str) -> PyResult<CameraConvention> {
     match name {
         "ros" => Ok(CameraConvention::Ros),
         "opengl" | "open_gl" => Ok(CameraConvention::OpenGl),

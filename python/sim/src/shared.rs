@@ -1,9 +1,11 @@
 //! The simulation behind all Python objects that refer to it.
 //!
 //! Lock order: a thread waits for the lock of the simulation only while it does not hold the interpreter. Otherwise a
-//! stepping thread that needs the interpreter and a thread that needs the simulation could wait for each other.
+//! stepping thread that needs the interpreter and a thread that needs the simulation could wait for each other. The wait
+//! has short parts, between which signals are handled.
 
 use crate::errors::{Class, Failure};
+use crate::timed_lock::{Locked, Poisoned, TimedLock};
 use kinetoscope::sim::{MjcfId, RigidObjectGroupId, RigidObjectId, RobotId, SimulationManager, TerrainId, WeldId};
 use kinetoscope::tasks::Env;
 use pyo3::prelude::*;
@@ -11,7 +13,7 @@ use std::hash::{DefaultHasher, Hash, Hasher as _};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, sync_channel};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError, TryLockError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 /// Handle of an entity.
@@ -53,10 +55,10 @@ impl Simulated {
 /// A simulation, its entities by name, and the process that created it.
 pub(crate) struct Shared {
     /// `None` after `destroy`.
-    manager: Mutex<Option<Simulated>>,
+    manager: TimedLock<Option<Simulated>>,
     entities: Mutex<Vec<(String, Entity)>>,
     num_envs: usize,
-    process: u32,
+    process: Process,
     /// True if the simulation has threads of its own: workers, the writer of a recording, a viewer. A forked process
     /// does not have them, and cannot use it. The flag stays when the threads end.
     has_threads: AtomicBool,
@@ -67,11 +69,16 @@ impl Shared {
         let has_threads = AtomicBool::new(manager.cfg().num_threads() != 1);
         Arc::new(Self {
             num_envs: manager.num_envs(),
-            manager: Mutex::new(Some(Simulated::Alone(Box::new(manager)))),
+            manager: TimedLock::new(Some(Simulated::Alone(Box::new(manager)))),
             entities: Mutex::new(Vec::new()),
-            process: std::process::id(),
+            process: Process::current(),
             has_threads,
         })
+    }
+
+    /// Process that created the simulation.
+    pub(crate) fn process(&self) -> Process {
+        self.process
     }
 
     /// Number of environments, which never changes.
@@ -97,17 +104,16 @@ impl Shared {
         py: Python<'_>,
         act: impl FnOnce(&SimulationManager) -> Result<T, Failure> + Send,
     ) -> PyResult<T> {
-        py.detach(|| self.read_detached(act)).map_err(Into::into)
+        self.with_lock(py, |locked| read(&locked, act))
     }
 
-    /// [`read`](Self::read) for a caller that does not hold the interpreter.
+    /// [`read`](Self::read) for a caller that does not hold the interpreter. Setting `stop` ends the wait for the lock.
     pub(crate) fn read_detached<T>(
         &self,
+        stop: &AtomicBool,
         act: impl FnOnce(&SimulationManager) -> Result<T, Failure>,
     ) -> Result<T, Failure> {
-        let guard = self.lock()?;
-        let sim = guard.as_ref().ok_or_else(destroyed)?.sim();
-        guarded(|| act(sim))
+        read(&*self.lock_until(stop)?, act)
     }
 
     /// Text of `repr`. Debuggers and notebooks ask for it at any time: it is no error that the simulation is gone, and a
@@ -119,13 +125,13 @@ impl Shared {
         act: impl FnOnce(&SimulationManager) -> Result<String, Failure> + Send,
     ) -> PyResult<String> {
         let described = || {
-            let state = match self.manager.try_lock() {
-                Ok(guard) => match guard.as_ref() {
+            let state = match self.manager.lock_within(Duration::ZERO) {
+                Ok(Some(locked)) => match locked.as_ref() {
                     Some(simulated) => return guarded(|| act(simulated.sim())),
                     None => "destroyed",
                 },
-                Err(TryLockError::WouldBlock) => "in use",
-                Err(TryLockError::Poisoned(_)) => "broken",
+                Ok(None) => "in use",
+                Err(Poisoned) => "broken",
             };
             Ok(format!("<{class} of a simulation that is {state}>"))
         };
@@ -138,21 +144,16 @@ impl Shared {
         py: Python<'_>,
         act: impl FnOnce(&mut SimulationManager) -> Result<T, Failure> + Send,
     ) -> PyResult<T> {
-        py.detach(|| self.write_detached(act)).map_err(Into::into)
+        self.with_lock(py, |locked| write(locked, act))
     }
 
-    /// [`write`](Self::write) for a caller that does not hold the interpreter.
+    /// [`write`](Self::write) for a caller that does not hold the interpreter. Setting `stop` ends the wait for the lock.
     pub(crate) fn write_detached<T>(
         &self,
+        stop: &AtomicBool,
         act: impl FnOnce(&mut SimulationManager) -> Result<T, Failure>,
     ) -> Result<T, Failure> {
-        let locked = || {
-            let mut guard = self.lock()?;
-            // The guard is dropped while the panic unwinds, which poisons the lock.
-            panic_if_requested();
-            act(guard.as_mut().ok_or_else(destroyed)?.sim_mut())
-        };
-        caught(locked)
+        write(self.lock_until(stop)?, act)
     }
 
     /// Starts a task in the environments, and returns its number. `make` gives the simulation back if the task is
@@ -167,31 +168,25 @@ impl Shared {
             panic_if_requested();
             make(sim)
         };
-        let locked = || {
-            let mut guard = self.lock()?;
-            match guard.take() {
-                None => Err(destroyed()),
-                Some(task @ Simulated::Task(..)) => {
-                    *guard = Some(task);
-                    Err(Failure::new(
-                        Class::Argument,
-                        "this simulation already has a task; end it with its method close",
-                    ))
-                }
-                Some(Simulated::Alone(sim)) => match made(*sim) {
-                    Ok(env) => {
-                        let number = STARTED.fetch_add(1, Ordering::Relaxed);
-                        *guard = Some(Simulated::Task(Box::new(env), number));
-                        Ok(number)
-                    }
-                    Err((failure, sim)) => {
-                        *guard = sim.map(Simulated::Alone);
-                        Err(failure)
-                    }
-                },
+        let start = |mut locked: Locked<'_, Option<Simulated>>| match locked.take() {
+            None => Err(destroyed()),
+            Some(task @ Simulated::Task(..)) => {
+                *locked = Some(task);
+                Err(Failure::new(Class::Argument, "this simulation already has a task; end it with its method close"))
             }
+            Some(Simulated::Alone(sim)) => match made(*sim) {
+                Ok(env) => {
+                    let number = STARTED.fetch_add(1, Ordering::Relaxed);
+                    *locked = Some(Simulated::Task(Box::new(env), number));
+                    Ok(number)
+                }
+                Err((failure, sim)) => {
+                    *locked = sim.map(Simulated::Alone);
+                    Err(failure)
+                }
+            },
         };
-        py.detach(|| caught(locked)).map_err(Into::into)
+        self.with_lock(py, |locked| caught(|| start(locked)))
     }
 
     /// Uses the task with this number without holding the interpreter. After a panic, later calls fail.
@@ -201,76 +196,101 @@ impl Shared {
         number: u64,
         act: impl FnOnce(&mut Env) -> Result<T, Failure> + Send,
     ) -> PyResult<T> {
-        py.detach(|| self.task_detached(number, act)).map_err(Into::into)
+        self.with_lock(py, |locked| use_task(locked, number, act))
     }
 
-    /// [`task`](Self::task) for a caller that does not hold the interpreter.
+    /// [`task`](Self::task) for a caller that does not hold the interpreter. Setting `stop` ends the wait for the lock.
     pub(crate) fn task_detached<T>(
         &self,
+        stop: &AtomicBool,
         number: u64,
         act: impl FnOnce(&mut Env) -> Result<T, Failure>,
     ) -> Result<T, Failure> {
-        let locked = || match self.lock()?.as_mut().ok_or_else(destroyed)? {
-            Simulated::Task(env, current) if *current == number => {
-                // The guard is dropped while the panic unwinds, which poisons the lock.
-                panic_if_requested();
-                act(env)
-            }
-            Simulated::Task(..) | Simulated::Alone(_) => Err(Failure::new(Class::Destroyed, "the task was closed")),
-        };
-        caught(locked)
+        use_task(self.lock_until(stop)?, number, act)
     }
 
     /// Ends the task with this number, if it has not ended; the simulation goes on alone.
     pub(crate) fn end_task(&self, py: Python<'_>, number: u64) -> PyResult<()> {
-        detached(py, || {
-            let mut guard = self.lock()?;
-            *guard = guard.take().map(|simulated| match simulated {
-                Simulated::Task(env, current) if current == number => Simulated::Alone(Box::new(env.into_sim())),
-                other => other,
-            });
-            Ok(())
+        self.with_lock(py, |mut locked| {
+            guarded(|| {
+                *locked = locked.take().map(|simulated| match simulated {
+                    Simulated::Task(env, current) if current == number => Simulated::Alone(Box::new(env.into_sim())),
+                    other => other,
+                });
+                Ok(())
+            })
         })
     }
 
     /// Frees the simulation. Its Python objects raise `DestroyedError` from then on.
     pub(crate) fn destroy(&self, py: Python<'_>) -> PyResult<()> {
-        detached(py, || {
-            let manager = match self.lock() {
-                Ok(mut guard) => guard.take(),
-                Err(failure) if failure.is_broken() => {
-                    self.manager.lock().unwrap_or_else(PoisonError::into_inner).take()
-                }
-                Err(failure) => return Err(failure),
-            };
-            drop(manager);
-            Ok(())
+        let free = |manager: Option<Simulated>| {
+            guarded(|| {
+                drop(manager);
+                Ok(())
+            })
+        };
+        if self.manager.is_poisoned() {
+            return py.detach(|| free(self.manager.lock_poisoned().take())).map_err(Into::into);
+        }
+        self.with_lock(py, |mut locked| {
+            let manager = locked.take();
+            // Other threads do not wait for the end of the simulation's own threads.
+            drop(locked);
+            free(manager)
         })
     }
 
-    fn lock(&self) -> Result<MutexGuard<'_, Option<Simulated>>, Failure> {
-        if std::process::id() == self.process {
-            return self.manager.lock().map_err(|_| Failure::broken());
+    /// Calls `act` with the lock, without holding the interpreter. Signals are handled while another thread holds the lock.
+    fn with_lock<T: Send>(
+        &self,
+        py: Python<'_>,
+        act: impl FnOnce(Locked<'_, Option<Simulated>>) -> Result<T, Failure> + Send,
+    ) -> PyResult<T> {
+        let mut act = Some(act);
+        loop {
+            let outcome = py.detach(|| {
+                let locked = self.lock_within(LOCK_INTERVAL)?;
+                Ok::<_, Failure>(locked.and_then(|locked| act.take().map(|act| act(locked))))
+            })?;
+            if let Some(outcome) = outcome {
+                return Ok(outcome?);
+            }
+            py.check_signals()?;
+        }
+    }
+
+    /// Waits for the lock until `stop` is set.
+    fn lock_until(&self, stop: &AtomicBool) -> Result<Locked<'_, Option<Simulated>>, Failure> {
+        while !stop.load(Ordering::Relaxed) {
+            if let Some(locked) = self.lock_within(LOCK_INTERVAL)? {
+                return Ok(locked);
+            }
+        }
+        Err(Failure::new(Class::Other, "interrupted while another thread used the simulation"))
+    }
+
+    /// Waits for the lock, at most `limit`.
+    fn lock_within(&self, limit: Duration) -> Result<Option<Locked<'_, Option<Simulated>>>, Failure> {
+        let broken = |Poisoned| Failure::broken();
+        if self.process.is_current() {
+            return self.manager.lock_within(limit).map_err(broken);
         }
         if self.has_threads.load(Ordering::Relaxed) {
-            let message = format!(
-                "this simulation belongs to process {}, and its threads do not exist in the forked process {}; create \
-                 the simulation in the child process, start children with the method \"spawn\" or \"forkserver\", or \
-                 use threads=1 without recordings and viewers",
-                self.process,
-                std::process::id()
-            );
-            return Err(Failure::new(Class::Fork, message));
+            let remedy = "create the simulation in the child process, start children with the method \"spawn\" or \
+                          \"forkserver\", or use threads=1 without recordings and viewers";
+            return Err(self.process.forked("this simulation", remedy));
         }
-        self.manager.try_lock().map_err(|error| match error {
-            TryLockError::Poisoned(_) => Failure::broken(),
-            // Another thread of the parent held the lock at the time of the fork and does not exist here.
-            TryLockError::WouldBlock => Failure::new(
+        let locked = self.manager.lock_within(Duration::ZERO).map_err(broken)?;
+        // Another thread of the parent held the lock at the time of the fork and does not exist here.
+        let held = || {
+            Failure::new(
                 Class::Fork,
                 "the process was forked while another thread used this simulation; create the simulation in the child \
                  process",
-            ),
-        })
+            )
+        };
+        locked.map(Some).ok_or_else(held)
     }
 
     /// Hash of a handle of this simulation, with its numbers.
@@ -334,8 +354,8 @@ impl Drop for Shared {
     fn drop(&mut self) {
         // In a forked process, the threads that the manager would wait for do not exist: leave its memory to the end of
         // the process.
-        let manager = self.manager.get_mut().unwrap_or_else(PoisonError::into_inner).take();
-        if std::process::id() != self.process && *self.has_threads.get_mut() {
+        let manager = self.manager.get_mut().take();
+        if !self.process.is_current() && *self.has_threads.get_mut() {
             std::mem::forget(manager);
             return;
         }
@@ -348,6 +368,78 @@ impl std::fmt::Debug for Shared {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.debug_struct("Shared").field("process", &self.process).finish_non_exhaustive()
     }
+}
+
+/// Process that created an object.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Process(u32);
+
+impl Process {
+    pub(crate) fn current() -> Self {
+        Self(std::process::id())
+    }
+
+    /// False in a forked process.
+    pub(crate) fn is_current(self) -> bool {
+        std::process::id() == self.0
+    }
+
+    /// Failure of a call in a forked process.
+    fn forked(self, what: &str, remedy: &str) -> Failure {
+        let (parent, child) = (self.0, std::process::id());
+        let problem = format!("{what} belongs to process {parent}, and its threads do not exist in the forked process");
+        Failure::new(Class::Fork, format!("{problem} {child}; {remedy}"))
+    }
+
+    /// Fails in a forked process, for a call of an object with threads, `what`.
+    pub(crate) fn check(self, what: &str) -> Result<(), Failure> {
+        if self.is_current() {
+            return Ok(());
+        }
+        let remedy = "create it in the child process, or start children with the method \"spawn\" or \"forkserver\"";
+        Err(self.forked(what, remedy))
+    }
+}
+
+/// Reads a simulation. A panic leaves it usable.
+fn read<T>(
+    simulated: &Option<Simulated>,
+    act: impl FnOnce(&SimulationManager) -> Result<T, Failure>,
+) -> Result<T, Failure> {
+    let sim = simulated.as_ref().ok_or_else(destroyed)?.sim();
+    guarded(|| act(sim))
+}
+
+/// Changes a simulation. A panic poisons the lock.
+fn write<T>(
+    locked: Locked<'_, Option<Simulated>>,
+    act: impl FnOnce(&mut SimulationManager) -> Result<T, Failure>,
+) -> Result<T, Failure> {
+    caught(move || {
+        // The lock is released while the panic unwinds, which poisons it.
+        let mut locked = locked;
+        panic_if_requested();
+        act(locked.as_mut().ok_or_else(destroyed)?.sim_mut())
+    })
+}
+
+/// Uses the task with this number. A panic poisons the lock.
+fn use_task<T>(
+    locked: Locked<'_, Option<Simulated>>,
+    number: u64,
+    act: impl FnOnce(&mut Env) -> Result<T, Failure>,
+) -> Result<T, Failure> {
+    caught(move || {
+        // The lock is released while the panic unwinds, which poisons it.
+        let mut locked = locked;
+        match locked.as_mut().ok_or_else(destroyed)? {
+            Simulated::Task(env, current) if *current == number => {
+                panic_if_requested();
+                act(env)
+            }
+            Simulated::Task(..) | Simulated::Alone(_) => Err(Failure::new(Class::Destroyed, "the task was closed")),
+        }
+    })
 }
 
 /// Runs a call without holding the interpreter. A panic becomes an `InternalError`.
@@ -414,6 +506,9 @@ pub(crate) fn interruptible<T: Send>(
 
 /// Longest wait before signals are handled.
 pub(crate) const SIGNAL_INTERVAL: Duration = Duration::from_millis(50);
+
+/// Longest wait for the lock of a simulation before signals are handled.
+const LOCK_INTERVAL: Duration = Duration::from_millis(10);
 
 /// True if the next guarded call panics.
 static PANICS: AtomicBool = AtomicBool::new(false);

@@ -424,7 +424,7 @@ impl Simulation {
         let (controls, env_ids) = (array::<Ix3>(controls, "rollout, controls")?, envs(&self.shared, env_ids)?);
         let start = start.map(|start| &start.get().inner);
         let rollout = interruptible(py, |stop| {
-            self.shared.read_detached(|sim| Ok(rollout_until(sim, stop, &controls, start, env_ids.as_deref())?))
+            self.shared.read_detached(stop, |sim| Ok(rollout_until(sim, stop, &controls, start, env_ids.as_deref())?))
         })?;
         let final_states = Snapshot { inner: rollout.final_states };
         Ok((rollout.states.into_pyarray(py).into_any(), final_states, rollout.diverged))

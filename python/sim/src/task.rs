@@ -259,7 +259,7 @@ impl Task {
         };
         let (step, present, last) = if self.is_slow.load(Ordering::Relaxed) {
             interruptible(py, |stop| {
-                self.shared.task_detached(self.number, |env| {
+                self.shared.task_detached(stop, self.number, |env| {
                     let step = env.step_until(stop, &actions)?;
                     results(env, step)
                 })

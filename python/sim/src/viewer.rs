@@ -3,7 +3,8 @@
 use crate::arguments::{bytes, time_limit};
 use crate::cfg;
 use crate::errors::Failure;
-use crate::shared::{SIGNAL_INTERVAL, Shared, detached, guarded};
+use crate::file_recording::FileRecording;
+use crate::shared::{Process, SIGNAL_INTERVAL, Shared, detached, guarded};
 use crate::simulation::Simulation;
 use crate::values::Values;
 use crate::viewer_control::check_speed;
@@ -54,6 +55,7 @@ impl Server {
 #[pyclass(frozen, module = "kinetoscope")]
 #[derive(Debug)]
 pub(crate) struct Window {
+    pub(crate) shared: Arc<Shared>,
     pub(crate) inner: kinetoscope::viewer::Window,
 }
 
@@ -76,40 +78,53 @@ fn failure(window: &kinetoscope::viewer::Window) -> Option<String> {
     window.closed().and_then(|closed| closed.error().map(String::from))
 }
 
+impl Window {
+    /// The window. Fails in a forked process, which does not have its thread.
+    fn window(&self) -> Result<&kinetoscope::viewer::Window, Failure> {
+        self.shared.process().check("this window")?;
+        Ok(&self.inner)
+    }
+}
+
 #[pymethods]
 impl Window {
     /// True while the window is open.
     #[getter]
-    fn is_open(&self) -> bool {
-        self.inner.is_open()
+    fn is_open(&self) -> PyResult<bool> {
+        Ok(self.window()?.is_open())
     }
 
     /// Number of frames sent to the display.
     #[getter]
-    fn frame_count(&self) -> u64 {
-        self.inner.frame_count()
+    fn frame_count(&self) -> PyResult<u64> {
+        Ok(self.window()?.frame_count())
     }
 
     /// Waits until the window is closed, at most ``timeout`` seconds, and returns True if it is. The user, a call of
     /// ``close`` or the end of the simulation closes it.
     #[pyo3(signature = (timeout=None))]
     fn wait(&self, py: Python<'_>, timeout: Option<f64>) -> PyResult<bool> {
-        wait_until_closed(py, &self.inner, timeout)
+        wait_until_closed(py, self.window()?, timeout)
     }
 
     /// Error that closed the window, such as a lost display; None if it is open or was closed as intended.
     #[getter]
     fn failure(&self) -> PyResult<Option<String>> {
-        Ok(guarded(|| Ok(failure(&self.inner)))?)
+        Ok(guarded(|| Ok(failure(self.window()?)))?)
     }
 
     /// Requests the window to close, without waiting.
-    fn close(&self) {
-        self.inner.close();
+    fn close(&self) -> PyResult<()> {
+        self.window()?.close();
+        Ok(())
     }
 
     fn __repr__(&self) -> &'static str {
-        if self.inner.is_open() { "<Window, open>" } else { "<Window, closed>" }
+        match self.window() {
+            Err(_) => "<Window of another process>",
+            Ok(window) if window.is_open() => "<Window, open>",
+            Ok(_) => "<Window, closed>",
+        }
     }
 }
 
@@ -119,6 +134,19 @@ impl Window {
 #[derive(Debug)]
 pub(crate) struct ImageWindow {
     inner: kinetoscope::viewer::ImageWindow,
+    process: Process,
+}
+
+impl ImageWindow {
+    /// The window. Fails in a forked process, which does not have its thread.
+    fn images(&self) -> Result<&kinetoscope::viewer::ImageWindow, Failure> {
+        self.process.check("this window")?;
+        Ok(&self.inner)
+    }
+
+    fn window(&self) -> Result<&kinetoscope::viewer::Window, Failure> {
+        Ok(self.images()?.window())
+    }
 }
 
 #[pymethods]
@@ -132,7 +160,8 @@ impl ImageWindow {
         let (title, size) = (title.unwrap_or(defaults.title), size.unwrap_or(defaults.size));
         check_size(size)?;
         let cfg = ImageWindowCfg { title, size, display };
-        Ok(Self { inner: detached(py, || Ok(kinetoscope::viewer::ImageWindow::open(cfg)?))? })
+        let inner = detached(py, || Ok(kinetoscope::viewer::ImageWindow::open(cfg)?))?;
+        Ok(Self { inner, process: Process::current() })
     }
 
     /// Replaces the image and returns at once: uint8, shape (height, width, 4) or (height, width, 3). It is scaled to fit into the
@@ -140,38 +169,39 @@ impl ImageWindow {
     fn show(&self, py: Python<'_>, image: &Bound<'_, PyAny>) -> PyResult<()> {
         let pixels = bytes(image, "image")?;
         detached(py, || {
-            self.inner.show(canvas(&pixels)?);
+            self.images()?.show(canvas(&pixels)?);
             Ok(())
         })
     }
 
     /// True while the window is open.
     #[getter]
-    fn is_open(&self) -> bool {
-        self.inner.window().is_open()
+    fn is_open(&self) -> PyResult<bool> {
+        Ok(self.window()?.is_open())
     }
 
     /// Number of frames sent to the display.
     #[getter]
-    fn frame_count(&self) -> u64 {
-        self.inner.window().frame_count()
+    fn frame_count(&self) -> PyResult<u64> {
+        Ok(self.window()?.frame_count())
     }
 
     /// Waits until the window is closed, at most ``timeout`` seconds, and returns True if it is.
     #[pyo3(signature = (timeout=None))]
     fn wait(&self, py: Python<'_>, timeout: Option<f64>) -> PyResult<bool> {
-        wait_until_closed(py, self.inner.window(), timeout)
+        wait_until_closed(py, self.window()?, timeout)
     }
 
     /// Error that closed the window, such as a lost display; None if it is open or was closed as intended.
     #[getter]
     fn failure(&self) -> PyResult<Option<String>> {
-        Ok(guarded(|| Ok(failure(self.inner.window())))?)
+        Ok(guarded(|| Ok(failure(self.window()?)))?)
     }
 
     /// Requests the window to close, without waiting.
-    fn close(&self) {
-        self.inner.window().close();
+    fn close(&self) -> PyResult<()> {
+        self.window()?.close();
+        Ok(())
     }
 
     fn __enter__(slf: Bound<'_, Self>) -> Bound<'_, Self> {
@@ -179,12 +209,16 @@ impl ImageWindow {
     }
 
     #[pyo3(signature = (*_exception))]
-    fn __exit__(&self, _exception: &Bound<'_, pyo3::types::PyTuple>) {
-        self.close();
+    fn __exit__(&self, _exception: &Bound<'_, pyo3::types::PyTuple>) -> PyResult<()> {
+        self.close()
     }
 
     fn __repr__(&self) -> &'static str {
-        if self.is_open() { "<ImageWindow, open>" } else { "<ImageWindow, closed>" }
+        match self.window() {
+            Err(_) => "<ImageWindow of another process>",
+            Ok(window) if window.is_open() => "<ImageWindow, open>",
+            Ok(_) => "<ImageWindow, closed>",
+        }
     }
 }
 
@@ -217,9 +251,9 @@ fn canvas(pixels: &ArrayD<u8>) -> Result<Canvas, Failure> {
 impl Simulation {
     /// Serves the simulation to browsers; port 0 selects a free port. ``cfg`` is a ``ServeCfg``; keyword arguments replace
     /// its fields. ``speed`` is simulated seconds per second. ``allow_local_frames`` lets web pages of this machine show the
-    /// view in a frame, as notebooks do.
+    /// view in a frame, as notebooks do. ``record_button`` is the ``file_recording`` that the record button starts and stops.
     #[pyo3(signature = (address="127.0.0.1:0", *, speed=None, max_fps=None, max_viewers=None, jpeg_quality=None,
-        allow_local_frames=None, cfg=None))]
+        allow_local_frames=None, record_button=None, cfg=None))]
     #[expect(clippy::too_many_arguments, reason = "keyword arguments of a Python method")]
     fn serve(
         &self,
@@ -230,8 +264,10 @@ impl Simulation {
         max_viewers: Option<usize>,
         jpeg_quality: Option<u8>,
         allow_local_frames: Option<bool>,
+        record_button: Option<&Bound<'_, FileRecording>>,
         cfg: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Server> {
+        let button = record_button.map(|button| button.get().button(&self.shared, "serve")).transpose()?;
         let base = match cfg {
             None => ServeCfg::default(),
             Some(cfg) => cfg::of_table("ServeCfg", speed_table("ServeCfg", cfg)?.0)?,
@@ -242,7 +278,7 @@ impl Simulation {
             max_viewers: max_viewers.unwrap_or(base.max_viewers),
             jpeg_quality: jpeg_quality.unwrap_or(base.jpeg_quality),
             allow_local_frames: allow_local_frames.unwrap_or(base.allow_local_frames),
-            ..base
+            record_button: button,
         };
         check_speed(cfg.speed, "speed")?;
         if !(cfg.max_fps > 0.0 && cfg.max_fps.is_finite()) {
@@ -257,9 +293,10 @@ impl Simulation {
     }
 
     /// Opens a window that shows the simulation while it steps, in real time unless ``speed`` is another factor, or
-    /// None for no limit. ``cfg`` is a ``WindowCfg``, in place of the other arguments. Raises ``ViewerError`` without a
-    /// display.
-    #[pyo3(signature = (title=None, size=None, *, speed=1.0, display=None, cfg=None))]
+    /// None for no limit. ``record_button`` is the ``file_recording`` that the record button starts and stops. ``cfg`` is a
+    /// ``WindowCfg``, in place of the arguments before ``record_button``. Raises ``ViewerError`` without a display.
+    #[pyo3(signature = (title=None, size=None, *, speed=1.0, display=None, record_button=None, cfg=None))]
+    #[expect(clippy::too_many_arguments, reason = "keyword arguments of a Python method")]
     fn open_window(
         &self,
         py: Python<'_>,
@@ -267,8 +304,10 @@ impl Simulation {
         size: Option<[usize; 2]>,
         speed: Option<f64>,
         display: Option<String>,
+        record_button: Option<&Bound<'_, FileRecording>>,
         cfg: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Window> {
+        let button = record_button.map(|button| button.get().button(&self.shared, "open_window")).transpose()?;
         let cfg = if let Some(cfg) = cfg {
             if title.is_some() || size.is_some() || display.is_some() || speed != Some(1.0) {
                 return Err(Failure::argument("open_window", "give cfg or the other arguments, not both").into());
@@ -288,8 +327,9 @@ impl Simulation {
         };
         check_speed(cfg.speed, "speed")?;
         check_size(cfg.size)?;
+        let cfg = WindowCfg { record_button: button, ..cfg };
         let inner = self.shared.write_with_threads(py, |sim| Ok(sim.open_window_with(cfg)?))?;
-        Ok(Window { inner })
+        Ok(Window { shared: Arc::clone(&self.shared), inner })
     }
 
     /// Image of all environments, or of one, RGBA, uint8, shape (height, width, 4). With a path, a PNG file is written
@@ -344,7 +384,7 @@ impl Simulation {
             let problem = format!("width {width} and height {height}; both must be at least 1 pixel");
             return Err(Failure::argument("show", problem).into());
         }
-        let server = slf.get().serve(py, "127.0.0.1:0", None, None, None, None, Some(true), None)?;
+        let server = slf.get().serve(py, "127.0.0.1:0", None, None, None, None, Some(true), None, None)?;
         let frame = py.import("kinetoscope.notebook")?.getattr("Frame")?;
         frame.call1((server, width, height)).map(Bound::unbind)
     }
