@@ -102,7 +102,7 @@ fn fault(node: roxmltree::Node<'_, '_>) -> Option<String> {
         }
     }
     let copies = copies(node);
-    if COPYING.contains(&element) && !(copies <= MOST_COPIES) {
+    if COPYING.contains(&element) && copies > MOST_COPIES {
         return Some(format!("<{element}> makes {copies} copies: it must be at most {MOST_COPIES}"));
     }
     let cells = match element {
@@ -110,7 +110,7 @@ fn fault(node: roxmltree::Node<'_, '_>) -> Option<String> {
         "texture" => product(node, ["width", "height"]),
         _ => 0.0,
     };
-    (!(cells <= MOST_CELLS)).then(|| format!("<{element}> has {cells} cells: it must be at most {MOST_CELLS:e}"))
+    (cells > MOST_CELLS).then(|| format!("<{element}> has {cells} cells: it must be at most {MOST_CELLS:e}"))
 }
 
 /// Number of copies of the content of an element: the product of the counts of the element and of its parents.
