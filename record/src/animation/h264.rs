@@ -193,21 +193,21 @@ impl YuvFrame {
         Self { planes: [vec![0; luma], vec![0; luma / 4], vec![0; luma / 4]] }
     }
 
-    /// Converts a frame.
+    /// Converts a frame: plain loops over rows, which the compiler turns into vector instructions.
     fn fill(&mut self, rgba: &[u8], cfg: &StreamCfg) {
-        let StreamCfg { size: [width, height], colors, .. } = *cfg;
+        let StreamCfg { size: [width, _], colors, .. } = *cfg;
         let pixels = rgba.as_chunks::<4>().0;
-        for row in 0..height / 2 {
-            for column in 0..width / 2 {
-                let mut sums = [0_i32; 3];
-                for (dy, dx) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
-                    let at = (2 * row + dy) * width + 2 * column + dx;
-                    let rgb = pixels.get(at).map_or([0; 3], |p| [p[0], p[1], p[2]].map(i32::from));
-                    self.planes[0][at] = colors.luma(rgb);
-                    sums.iter_mut().zip(rgb).for_each(|(sum, one)| *sum += one);
-                }
-                let at = row * (width / 2) + column;
-                [self.planes[1][at], self.planes[2][at]] = colors.chroma(sums);
+        let [luma, cb, cr] = &mut self.planes;
+        for (y, pixel) in luma.iter_mut().zip(pixels) {
+            *y = colors.luma([i32::from(pixel[0]), i32::from(pixel[1]), i32::from(pixel[2])]);
+        }
+        let chroma = cb.chunks_exact_mut(width / 2).zip(cr.chunks_exact_mut(width / 2));
+        for (rows, (cb, cr)) in pixels.chunks_exact(2 * width).zip(chroma) {
+            let (upper, lower) = rows.split_at(width);
+            let squares = upper.as_chunks::<2>().0.iter().zip(lower.as_chunks::<2>().0);
+            for ((cb, cr), ([a, b], [c, d])) in cb.iter_mut().zip(cr).zip(squares) {
+                let sum = |k: usize| i32::from(a[k]) + i32::from(b[k]) + i32::from(c[k]) + i32::from(d[k]);
+                [*cb, *cr] = colors.chroma([sum(0), sum(1), sum(2)]);
             }
         }
     }
@@ -215,18 +215,22 @@ impl YuvFrame {
 
 impl ColorMatrix {
     /// Luma of a pixel.
+    #[inline]
     fn luma(&self, rgb: [i32; 3]) -> u8 {
         ((dot(&self.luma, rgb) + (16 << 16) + (1 << 15)) >> 16) as u8
     }
 
     /// Cb and Cr of the sums of four pixels.
+    #[inline]
     fn chroma(&self, sums: [i32; 3]) -> [u8; 2] {
-        self.chroma.each_ref().map(|weights| ((dot(weights, sums) + (128 << 18) + (1 << 17)) >> 18) as u8)
+        let one = |weights: &[i32; 3]| ((dot(weights, sums) + (128 << 18) + (1 << 17)) >> 18) as u8;
+        [one(&self.chroma[0]), one(&self.chroma[1])]
     }
 }
 
+#[inline]
 fn dot(weights: &[i32; 3], rgb: [i32; 3]) -> i32 {
-    weights.iter().zip(rgb).map(|(weight, x)| weight * x).sum()
+    weights[0] * rgb[0] + weights[1] * rgb[1] + weights[2] * rgb[2]
 }
 
 #[cfg(test)]
@@ -257,6 +261,24 @@ mod tests {
                 }
             }
         }
+    }
+
+    /// Reference: each pixel and each square of four pixels by its position.
+    #[test]
+    fn planes() {
+        let [width, height] = [6, 4];
+        let rgba: Vec<u8> = (0..4 * width * height).map(|k| (k * k * 7 + 13) as u8).collect();
+        let mut frame = YuvFrame::new([width, height]);
+        frame.fill(&rgba, &StreamCfg { size: [width, height], colors: &BT709, idr_interval: 2 });
+        let pixel = |x: usize, y: usize| [0, 1, 2].map(|k| i32::from(rgba[4 * (y * width + x) + k]));
+        let all = |side: [usize; 2]| (0..side[0] * side[1]).map(move |at| [at % side[0], at / side[0]]);
+        assert!(all([width, height]).map(|[x, y]| BT709.luma(pixel(x, y))).eq(frame.planes[0].iter().copied()));
+        let squares = all([width / 2, height / 2]).map(|[x, y]| {
+            let four = [[0, 0], [1, 0], [0, 1], [1, 1]].map(|[dx, dy]| pixel(2 * x + dx, 2 * y + dy));
+            BT709.chroma([0, 1, 2].map(|k| four.iter().map(|rgb| rgb[k]).sum()))
+        });
+        let found = frame.planes[1].iter().zip(&frame.planes[2]).map(|(cb, cr)| [*cb, *cr]);
+        assert!(squares.eq(found));
     }
 
     #[test]
