@@ -1,7 +1,7 @@
 //! Limits of numbers in MJCF, checked before MuJoCo reads them.
 //!
-//! MuJoCo's loader has no limits of its own: with lengths of 1e12 or with infinite positions it may not end, and sizes whose
-//! product exceeds 32 bits overflow.
+//! MuJoCo's loader has no limits of its own: with huge lengths or infinite positions it may not end, because it simulates
+//! muscles to find the range of their lengths, and sizes whose product exceeds 32 bits overflow.
 
 use super::error::CompileError;
 use kinetoscope_scene::input_file;
@@ -15,8 +15,8 @@ const LARGEST_LENGTH: f64 = 1e8;
 /// with their square, to 8 s.
 const MOST_COPIES: f64 = 10_000.0;
 
-/// Most cells of a height field, and most pixels of a texture. MuJoCo counts bytes in 32 bits: a cube has 6 images of 3 bytes
-/// per pixel.
+/// Most cells of a height field, and most pixels of an image of a texture. MuJoCo counts bytes in 32 bits: a cube has 6 images of
+/// 3 bytes per pixel.
 const MOST_CELLS: f64 = 1e8;
 
 /// Attributes with positions, lengths, axes and orientations.
@@ -107,6 +107,8 @@ fn fault(node: roxmltree::Node<'_, '_>) -> Option<String> {
     }
     let cells = match element {
         "hfield" => product(node, ["nrow", "ncol"]),
+        // The images of a cube, the default, are squares: MuJoCo ignores their height.
+        "texture" if node.attribute("type") != Some("2d") => product(node, ["width", "width"]),
         "texture" => product(node, ["width", "height"]),
         _ => 0.0,
     };
@@ -120,7 +122,7 @@ fn copies(node: roxmltree::Node<'_, '_>) -> f64 {
     counts.flat_map(words).map(|(_, count)| count.max(1.0)).product()
 }
 
-/// Product of two attributes; one of them without a value counts as 1.
+/// Product of two attributes; one of them without a number counts as 1.
 fn product(node: roxmltree::Node<'_, '_>, names: [&str; 2]) -> f64 {
     let numbers = names.iter().filter_map(|name| node.attribute(*name)).flat_map(words);
     numbers.map(|(_, number)| number.max(1.0)).product()
@@ -137,7 +139,7 @@ mod tests {
     use super::*;
     use crate::{LoadError, compile_file, compile_text};
 
-    /// Root cause: MuJoCo's loader got these numbers; with the first row, 2.2.2 did not end.
+    /// Root cause: MuJoCo's loader got these numbers.
     #[test]
     fn refused() {
         for (element, expected) in [
@@ -163,12 +165,27 @@ mod tests {
         }
         for (asset, cells) in [
             ("<texture type='2d' builtin='flat' width='40000' height='40000'/>", "<texture> has 1600000000 cells"),
+            (
+                "<texture type='skybox' builtin='gradient' width='100000' height='1'/>",
+                "<texture> has 10000000000 cells",
+            ),
             ("<hfield name='h' size='1 1 1 1' nrow='100000' ncol='100000'/>", "<hfield> has 10000000000 cells"),
         ] {
             let text = format!("<mujoco><asset>{asset}</asset></mujoco>");
             let Err(LoadError::Compile(error)) = compile_text(&text) else { panic!("accepted: {asset}") };
             assert_eq!(error.message, format!("{cells}: it must be at most 1e8"));
         }
+    }
+
+    /// MuJoCo 2.2.2 looks for the range of the muscle's length without end.
+    #[test]
+    fn endless_search() {
+        let text = "<mujoco><worldbody><site name='a' pos='1 0 1'/><body><joint axis='0 1 0' limited='true' range='-90 90'/>\
+                    <geom size='.1'/><site name='b' pos='inf 0 0'/></body></worldbody><tendon><spatial name='t'>\
+                    <site site='a'/><site site='b'/></spatial></tendon><actuator><muscle tendon='t'/></actuator></mujoco>";
+        let Err(LoadError::Compile(error)) = compile_text(text) else { panic!("accepted") };
+        assert!(error.message.starts_with("`pos` of <site> has inf"), "{error}");
+        compile_text(&text.replace("inf", "0.2")).unwrap();
     }
 
     /// Numbers at the limits, and large numbers that are not lengths.

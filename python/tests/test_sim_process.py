@@ -51,17 +51,13 @@ PREPARED = {
 }
 
 
-@pytest.mark.parametrize("name", LONG_CALLS)
-def test_ctrl_c_ends_long_calls(name, tmp_path):
-    call, after = LONG_CALLS[name]
-    code = SCENE.format(threads=2) + "import time\nimport numpy as np\n" + PREPARED.get(name, "") + (
-        "print('ready', flush=True)\n"
-        f"try:\n    {call}\nexcept KeyboardInterrupt:\n    late = time.time()\n    print('interrupted', late, {after})\n"
-    )
-    process = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True, cwd=tmp_path)
+def assert_interrupted(code, folder, after):
+    """Runs a program that prints ``ready``, sends Ctrl+C after some seconds [s], and expects its line: ``interrupted``, the time
+    of the exception, True."""
+    process = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True, cwd=folder)
     try:
         assert process.stdout.readline() == "ready\n"
-        time.sleep(1.0)
+        time.sleep(after)
         sent = time.time()
         process.send_signal(signal.SIGINT)
         words = process.communicate(timeout=60)[0].split()
@@ -69,6 +65,16 @@ def test_ctrl_c_ends_long_calls(name, tmp_path):
         process.kill()
     assert words[0] == "interrupted" and words[2] == "True"
     assert float(words[1]) - sent < 0.2
+
+
+@pytest.mark.parametrize("name", LONG_CALLS)
+def test_ctrl_c_ends_long_calls(name, tmp_path):
+    call, after = LONG_CALLS[name]
+    code = SCENE.format(threads=2) + "import time\nimport numpy as np\n" + PREPARED.get(name, "") + (
+        "print('ready', flush=True)\n"
+        f"try:\n    {call}\nexcept KeyboardInterrupt:\n    late = time.time()\n    print('interrupted', late, {after})\n"
+    )
+    assert_interrupted(code, tmp_path, after=1.0)
 
 
 # Calls that wait for a simulation that another thread uses.
@@ -93,17 +99,7 @@ def test_ctrl_c_ends_the_wait_for_another_thread(name, tmp_path):
         f"try:\n    {WAITING_CALLS[name]}\nexcept KeyboardInterrupt:\n"
         "    print('interrupted', time.time(), thread.is_alive() and 'in use' in repr(sim), flush=True)\nos._exit(0)\n"
     )
-    process = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True, cwd=tmp_path)
-    try:
-        assert process.stdout.readline() == "ready\n"
-        time.sleep(0.5)
-        sent = time.time()
-        process.send_signal(signal.SIGINT)
-        words = process.communicate(timeout=60)[0].split()
-    finally:
-        process.kill()
-    assert words[0] == "interrupted" and words[2] == "True"
-    assert float(words[1]) - sent < 0.2
+    assert_interrupted(code, tmp_path, after=0.5)
 
 
 def test_python_handlers_run_during_update():

@@ -294,6 +294,7 @@ mod tests {
         copy(&from, &to).expect("copied");
         assert_eq!(fs::read_to_string(to.join("a/b/c.stl")).expect("a file"), "solid");
     }
+
     #[test]
     fn tests_for_users_need_no_other_package() {
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../python/tests");
