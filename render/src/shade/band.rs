@@ -11,7 +11,7 @@ use crate::raster::tile::{BLOCK, OPENGL_SAMPLES, SAMPLES, Tile};
 use crate::raster::{DrawItem, VisibilityRasterizer};
 use crate::request::RenderRequest;
 use crate::simd::{LANES, Simd, SimdLevel, as_lanes, at_level, load, splat_i};
-use crate::trace::CameraView;
+use crate::trace::{CameraView, Candidates};
 use crate::visibility::Projection;
 use kinetoscope_scene::RenderScene;
 use std::cell::RefCell;
@@ -28,6 +28,7 @@ pub(crate) struct RasterScratch {
     /// Stack for visibility rays; `shade_stack` is for rays cast during shading.
     stack: TraversalStack,
     shade_stack: TraversalStack,
+    candidates: Candidates,
     colors: Vec<Colors>,
     edges: EdgeSamples,
     lit_polygons: LitPolygons,
@@ -43,6 +44,7 @@ impl RasterScratch {
             rasterizer: VisibilityRasterizer::default(),
             stack: TraversalStack::default(),
             shade_stack: TraversalStack::default(),
+            candidates: Candidates::default(),
             colors: Vec::new(),
             edges: EdgeSamples::default(),
             lit_polygons: LitPolygons::default(),
@@ -59,6 +61,7 @@ impl RasterScratch {
             + self.lit_polygons.bytes()
             + self.stack.bytes()
             + self.shade_stack.bytes()
+            + self.candidates.bytes()
     }
 
     /// BVH stack, as scratch memory.
@@ -114,7 +117,8 @@ impl RasterScratch {
         frame: &mut FrameMut<'_>,
         top: usize,
     ) {
-        let Self { tile, layer, blended_tile, rasterizer, stack, shade_stack, colors, edges, lit_polygons, .. } = self;
+        let Self { tile, layer, blended_tile, rasterizer, stack, shade_stack, .. } = self;
+        let Self { candidates, colors, edges, lit_polygons, .. } = self;
         let list = &plan.list;
         let view = CameraView {
             projection,
@@ -139,9 +143,10 @@ impl RasterScratch {
         tile.finish();
         let wanted = [Stage::Surface, Stage::Albedo, Stage::Flow].map(|stage| frame.wants(stage));
         let [wants_detail, wants_albedo, wants_flow] = wanted;
-        // Shading has shared references only, so its stack is in a cell.
+        // Shading has shared references only, so its scratch memory is in cells.
         let (shade_stack, lit_polygons) = (RefCell::new(shade_stack), RefCell::new(lit_polygons));
-        let context = plan.context(render_request, projection, &shade_stack, &lit_polygons, wanted);
+        let candidates = RefCell::new(candidates);
+        let context = plan.context(render_request, projection, &shade_stack, &candidates, &lit_polygons, wanted);
         let veils = !list.blended.is_empty();
         if veils {
             blended_tile.copy(tile);

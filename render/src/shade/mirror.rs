@@ -4,14 +4,13 @@
 use super::corner_light::{PolygonSource, light_at_corners};
 use super::group::{Colors, ShadingContext};
 use super::light::{ShadeContext, ViewRays, shade, sky};
-use super::shadow_rays::{SurfacePoints, arrays, lanes_of};
+use super::shadow_rays::{SurfacePoints, arrays, offset_origins};
 use super::surface::{InstanceSurface, Surface, SurfacePointLanes};
 use super::tone::BlendSpace;
 use crate::geometry::bvh::TraversalStack;
 use crate::geometry::interpolation::interpolate_triangle;
-use crate::simd::{F, LANES, M, Simd, V3, abs, load, max, min, select, splat};
-use crate::trace::motion::END_TIME;
-use crate::trace::{Hit, RayTracer, RoundBounds};
+use crate::simd::{F, LANES, M, Simd, V3, load, max, min, splat};
+use crate::trace::{Candidates, Hit, RayGroup, RayHit, RayTracer, lanes_of};
 use kinetoscope_scene::Ray;
 use kinetoscope_scene::shape::Shape;
 use kinetoscope_scene::vector::{add_scaled, dot, scale, sub, to_f64};
@@ -30,79 +29,13 @@ const MIN_THROUGHPUT: f32 = 1e-3;
 pub(crate) struct Mirrors<'a> {
     pub(crate) tracer: &'a RayTracer,
     pub(crate) stack: &'a RefCell<&'a mut TraversalStack>,
+    pub(crate) candidates: &'a RefCell<&'a mut Candidates>,
     /// Index of the first instance that mirrors.
     pub(crate) first: usize,
     /// True if no other instance mirrors, as in MuJoCo's renderer.
     pub(crate) only_first: bool,
-    /// Bounding box of the objects that mirrored rays may hit; `None` if one of them is unbounded, or if several
-    /// instances mirror.
-    pub(crate) bounds: Option<ReflectionBounds<'a>>,
-}
-
-/// Bounds of the objects that mirrored rays may hit, enlarged by the error of single precision. Rays that miss them, as from
-/// most of a floor, are not traced.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct ReflectionBounds<'a> {
-    /// Bounding box of all.
-    all: [[f32; 3]; 2],
-    each: &'a [RoundBounds],
-    /// Index of the mirror, which is convex: mirrored rays do not hit it.
-    mirror: u32,
-}
-
-impl<'a> ReflectionBounds<'a> {
-    /// Enlargement of the box, as a fraction of its size and coordinates.
-    const MARGIN: f64 = 1e-3;
-
-    pub(crate) fn new([lo, hi]: [[f64; 3]; 2], each: &'a [RoundBounds], mirror: u32) -> Self {
-        let pad = (0..3).map(|k| (hi[k] - lo[k]) + lo[k].abs().max(hi[k].abs())).fold(0.0, f64::max) * Self::MARGIN;
-        Self { all: [lo.map(|x| (x - pad) as f32), hi.map(|x| (x + pad) as f32)], each, mirror }
-    }
-
-    /// Those of the lanes whose rays, from `origin` in a direction (unit), may hit an object.
-    #[inline(always)]
-    fn may_intersect<S: Simd>(&self, s: S, origin: V3<S>, direction: V3<S>, lanes: M<S>) -> M<S> {
-        let lanes = lanes & self.may_intersect_box(s, origin, direction);
-        let mut found = lanes & !lanes;
-        for bounds in self.each.iter().filter(|bounds| bounds.instance != self.mirror) {
-            let wanted = lanes & !found;
-            if !wanted.any_true() {
-                break;
-            }
-            let to = V3::splat(s, bounds.center).sub(origin);
-            let (square, along) = (to.dot(to), to.dot(direction));
-            let radius = bounds.radius * bounds.radius;
-            // The differences lose digits, in proportion to the distance.
-            let near = (square - along * along).simd_le(square * 1e-6 + radius)
-                & (along.simd_ge(splat(s, 0.0)) | square.simd_le(splat(s, radius)));
-            if (wanted & near).any_true() {
-                let across = direction.cross(V3::splat(s, bounds.axis));
-                let distance = to.dot(across);
-                let limit = (square * 1e-9 + bounds.across * bounds.across) * across.dot(across);
-                found |= wanted & near & (distance * distance).simd_le(limit + square * 1e-12);
-            }
-        }
-        found
-    }
-
-    /// Lanes whose rays may hit the box.
-    #[inline(always)]
-    fn may_intersect_box<S: Simd>(&self, s: S, origin: V3<S>, direction: V3<S>) -> M<S> {
-        let [lo, hi] = &self.all;
-        let (mut near, mut far) = (splat(s, 0.0), splat(s, f32::MAX));
-        for (o, d, lo, hi) in [
-            (origin.x, direction.x, lo[0], hi[0]),
-            (origin.y, direction.y, lo[1], hi[1]),
-            (origin.z, direction.z, lo[2], hi[2]),
-        ] {
-            // Directions along the faces would divide by zero.
-            let tiny = splat(s, 1e-12);
-            let inverse = splat(s, 1.0) / select(abs(d).simd_lt(tiny), tiny, d);
-            let (a, b) = ((splat(s, lo) - o) * inverse, (splat(s, hi) - o) * inverse);
-            (near, far) = (max(near, min(a, b)), min(far, max(a, b)));
-        }
-        near.simd_le(far)
-    }
+    /// True if mirrored rays can hit bounded objects only, and not the mirror itself: it is the only one, and convex.
+    pub(crate) bounded: bool,
 }
 
 /// Reflectance of an instance that is a planar mirror, 0..=1; 0 for other shapes and transparent instances.
@@ -126,13 +59,16 @@ pub(crate) struct MirrorSamples<S: Simd> {
     pub(crate) color: V3<S>,
 }
 
-/// A mirrored ray, and the distance \[m\] traced so far.
-#[derive(Clone, Copy, Debug)]
-struct ReflectedRay {
-    ray: Ray,
-    distance: f64,
-    /// Fraction of the light that is left.
-    throughput: f32,
+/// Mirrored rays of the samples.
+#[derive(Clone, Debug)]
+struct ReflectedRays {
+    /// Samples with a ray.
+    lanes: u64,
+    rays: [Ray; LANES],
+    /// Distances traced so far \[m\], from the camera on.
+    distances: [f64; LANES],
+    /// Fractions of the light that are left; 1 for samples without a ray.
+    throughputs: [f32; LANES],
 }
 
 /// Surfaces in lanes that are set one by one.
@@ -161,8 +97,8 @@ impl SurfaceLanes {
     };
 
     /// Sets a lane to the hit of a ray.
-    fn set(&mut self, k: usize, scene: &RenderScene, reflected: &ReflectedRay, hit: &Hit) {
-        let (ray, pose) = (&reflected.ray, &hit.world_from_instance);
+    fn set(&mut self, k: usize, scene: &RenderScene, reflected: &ReflectedRays, hit: &Hit) {
+        let (ray, pose) = (&reflected.rays[k], &hit.world_from_instance);
         let position = ray.at(hit.distance);
         let side = if dot(hit.normal, ray.direction) < 0.0 { 1.0 } else { -1.0 };
         let (rotation, from) = (pose.rotation, sub(position, pose.translation));
@@ -188,7 +124,7 @@ impl SurfaceLanes {
         for (to, from) in self.shares.iter_mut().zip(corner.map_or([0.0; 3], |corner| corner.shares)) {
             to[k] = from as f32;
         }
-        self.distances[k] = (reflected.distance + hit.distance) as f32;
+        self.distances[k] = (reflected.distances[k] + hit.distance) as f32;
     }
 
     #[inline(always)]
@@ -237,33 +173,27 @@ impl Mirrors<'_> {
                 let lanes = lanes & normal.dot(V3::splat(s, up)).simd_gt(splat(s, 0.5));
                 let mirrored_view = view.sub(normal.scale(view.dot(normal) * 2.0));
                 let display = context.shade.scene.lighting_space == LightingSpace::Display;
-                let followed = match &self.bounds {
-                    Some(reach) => reach.may_intersect(s, point.position, mirrored_view, lanes),
-                    None => lanes,
-                };
-                let wanted = followed.to_bitmask();
+                let group = RayGroup { origin: offset_origins(point), direction: mirrored_view };
+                let candidates = &mut **self.candidates.borrow_mut();
+                self.tracer.find_candidates(s, group, lanes, self.skipped(), candidates);
+                let wanted = if self.bounded { candidates.lanes() } else { lanes.to_bitmask() };
                 if lanes.to_bitmask() == 0 || display && wanted == 0 {
                     return color;
                 }
                 let points = SurfacePoints::new(point);
                 let (directions, lengths, depths) = (arrays(view), length.array(), depth.array());
-                let mut rays = [None; LANES];
+                let mut rays = ReflectedRays { lanes: wanted, ..ReflectedRays::NONE };
                 for k in lanes_of(wanted) {
                     let (n, d) = (points.normal(k), to_f64(directions.map(|axis| axis[k])));
                     let mirrored = add_scaled(d, -2.0 * dot(d, n), n);
                     let direction = scale(mirrored, 1.0 / dot(mirrored, mirrored).sqrt());
-                    let ray = Ray { origin: points.offset_origin(k), direction };
-                    let traveled = f64::from(depths[k]) * f64::from(lengths[k]);
-                    rays[k] = Some(ReflectedRay { ray, distance: traveled, throughput: 1.0 });
+                    rays.rays[k] = Ray { origin: points.offset_origin(k), direction };
+                    rays.distances[k] = f64::from(depths[k]) * f64::from(lengths[k]);
                 }
                 let r = reflectance(source.instance);
                 let tint = if display { r } else { 1.0 };
                 let mut sum: Colors = [[0.0; LANES]; 3];
-                let hit_lanes = self.trace_reflections(s, context, &mut rays, tint, length, &mut sum);
-                let mut left = [0.0f32; LANES];
-                for (left, ray) in left.iter_mut().zip(&rays) {
-                    *left = ray.map_or(1.0, |ray| ray.throughput);
-                }
+                let hit_lanes = self.trace_reflections(s, context, candidates, &mut rays, (tint, length), &mut sum);
                 let sum = V3 { x: load(s, &sum[0]), y: load(s, &sum[1]), z: load(s, &sum[2]) };
                 if display {
                     if hit_lanes == 0 {
@@ -280,22 +210,22 @@ impl Mirrors<'_> {
                     return V3::select(hit, lit, color);
                 }
                 let beyond = sky(s, context.shade.lighting, mirrored_view, context.shade.pixel.angle());
-                let mirrored = sum.add(beyond.scale(load(s, &left)));
+                let mirrored = sum.add(beyond.scale(load(s, &rays.throughputs)));
                 V3::select(lanes, color.scale(splat(s, 1.0 - r)).add(mirrored.scale(splat(s, r))), color)
             },
         )
     }
 
-    /// Adds up the colors that mirrored rays hit, as linear light or as sRGB bytes; returns the lanes with a hit.
-    /// `tint` is that of [`shade`].
+    /// Adds up the colors that mirrored rays hit, as linear light or as sRGB bytes; returns the lanes with a
+    /// hit. `candidates` are those of the rays, `tint` is that of [`shade`].
     #[inline(always)]
     fn trace_reflections<S: Simd>(
         &self,
         s: S,
         context: &ShadingContext<'_>,
-        rays: &mut [Option<ReflectedRay>; LANES],
-        tint: f32,
-        length: F<S>,
+        candidates: &mut Candidates,
+        rays: &mut ReflectedRays,
+        (tint, length): (f32, F<S>),
         sum: &mut Colors,
     ) -> u64 {
         let (scene, mut at) = (context.shade.scene, SurfaceLanes::EMPTY);
@@ -303,36 +233,39 @@ impl Mirrors<'_> {
         let blend = context.shade.lighting.blend;
         let lit = ShadeContext { receives_shadows: scene.opengl.is_none(), image_axes: None, ..context.shade };
         let mut hit_lanes = 0;
-        for _ in 0..MAX_PASSES {
-            let mut hits = [None; LANES];
+        for pass in 0..MAX_PASSES {
             let mut left = 0u64;
-            {
-                let mut stack = self.stack.borrow_mut();
-                for (k, reflected) in rays.iter_mut().enumerate() {
-                    let Some(reflected) = reflected.as_mut().filter(|r| r.throughput > MIN_THROUGHPUT) else {
-                        continue;
-                    };
-                    hits[k] = self.next(s, scene, reflected, &mut stack);
-                    left |= u64::from(hits[k].is_some()) << k;
-                }
+            for k in lanes_of(rays.lanes) {
+                left |= u64::from(rays.throughputs[k] > MIN_THROUGHPUT) << k;
             }
+            if left == 0 {
+                break;
+            }
+            if pass > 0 {
+                self.find_candidates(s, rays, left, candidates);
+            }
+            let hits = self.next(s, scene, candidates, rays, &mut left);
             if left == 0 {
                 break;
             }
             hit_lanes |= left;
             while left != 0 {
-                let Some(instance) = hits[left.trailing_zeros() as usize].map(|hit| hit.instance) else { break };
-                let mut bits = 0u64;
+                let first = left.trailing_zeros() as usize % LANES;
+                let Some(instance) = hits[first].map(|hit| self.tracer.instance_of(&hit)) else { break };
+                let (mut bits, mut triangles) = (0u64, [0u32; LANES]);
                 let mut directions = [[0.0f32; LANES], [0.0; LANES], [1.0; LANES]];
                 for k in lanes_of(left) {
-                    let (Some(hit), Some(reflected)) = (&hits[k], &rays[k]) else { continue };
-                    if hit.instance == instance {
-                        bits |= 1 << k;
-                        at.set(k, scene, reflected, hit);
-                        for (to, from) in directions.iter_mut().zip(reflected.ray.direction) {
-                            to[k] = from as f32;
-                        }
+                    let Some(hit) = hits[k].filter(|hit| self.tracer.instance_of(hit) == instance) else { continue };
+                    let Some(hit) = self.tracer.surface(&hit) else { continue };
+                    bits |= 1 << k;
+                    triangles[k] = hit.triangle;
+                    at.set(k, scene, rays, &hit);
+                    for (to, from) in directions.iter_mut().zip(rays.rays[k].direction) {
+                        to[k] = from as f32;
                     }
+                }
+                if bits == 0 {
+                    break;
                 }
                 left &= !bits;
                 let source = context.source(instance as usize);
@@ -343,7 +276,6 @@ impl Mirrors<'_> {
                 let mirrored = ViewRays { direction, distance };
                 let here_lanes = mask(s, bits);
                 let corner_light = context.lit_polygons.map(|table| {
-                    let triangles = hits.map(|hit| hit.map_or(0, |hit| hit.triangle));
                     let polygons = PolygonSource { index: instance, source: &source, mesh: source.instance.mesh() };
                     light_at_corners(s, &lit, table, polygons, &triangles, &here, mirrored, false, tint, here_lanes)
                 });
@@ -358,48 +290,98 @@ impl Mirrors<'_> {
                 let is_additive = scene.opengl.is_some_and(|rules| rules.is_additive);
                 let passed = if is_additive && alpha < 1.0 { 1.0 } else { 1.0 - alpha };
                 for k in lanes_of(bits) {
-                    let (Some(hit), Some(reflected)) = (&hits[k], &mut rays[k]) else { continue };
+                    let Some(hit) = &hits[k] else { continue };
                     for (sum, seen) in sum.iter_mut().zip(&seen) {
-                        sum[k] += reflected.throughput * alpha * seen[k];
+                        sum[k] += rays.throughputs[k] * alpha * seen[k];
                     }
-                    reflected.throughput *= passed;
-                    reflected.pass(hit.distance);
+                    rays.throughputs[k] *= passed;
+                    rays.pass(k, hit.distance);
                 }
             }
         }
         hit_lanes
     }
 
-    /// The next surface along a mirrored ray, without backs of transparent surfaces, or any backs that are
+    /// Instance that mirrored rays do not hit; `None` if they may hit any.
+    fn skipped(&self) -> Option<u32> {
+        self.bounded.then_some(self.first as u32)
+    }
+
+    /// Finds the instances that the rays `lanes` may hit.
+    #[inline(always)]
+    fn find_candidates<S: Simd>(&self, s: S, reflected: &ReflectedRays, lanes: u64, candidates: &mut Candidates) {
+        let group = RayGroup::of(s, &reflected.rays);
+        self.tracer.find_candidates(s, group, mask(s, lanes), self.skipped(), candidates);
+    }
+
+    /// The next surfaces along the rays `lanes`, without backs of transparent surfaces, or any backs that are
     /// [culled](kinetoscope_scene::OpenGlRules::culls_backs); `None` without one, and after [`MAX_PASSES`] such backs.
+    /// `lanes` becomes those with a surface. `candidates` are those of the rays.
     #[inline(always)]
     fn next<S: Simd>(
         &self,
         s: S,
         scene: &RenderScene,
-        reflected: &mut ReflectedRay,
-        stack: &mut TraversalStack,
-    ) -> Option<Hit> {
-        for _ in 0..MAX_PASSES {
-            let hit = self.tracer.closest_hit(s, &reflected.ray, f64::INFINITY, END_TIME, stack)?;
-            let instance = &scene.instances()[hit.instance as usize];
-            let culls = scene.opengl.is_some_and(|rules| rules.culls_backs) && instance.group != Marker::GROUP;
-            if instance.material.rgba[3] >= 1.0 && !culls || dot(hit.normal, reflected.ray.direction) < 0.0 {
-                return Some(hit);
+        candidates: &mut Candidates,
+        reflected: &mut ReflectedRays,
+        lanes: &mut u64,
+    ) -> [Option<RayHit>; LANES] {
+        let mut stack = self.stack.borrow_mut();
+        let mut found = [None; LANES];
+        let mut left = std::mem::take(lanes);
+        for pass in 0..MAX_PASSES {
+            if left == 0 {
+                break;
             }
-            reflected.pass(hit.distance);
+            if pass > 0 {
+                self.find_candidates(s, reflected, left, candidates);
+            }
+            for k in lanes_of(left) {
+                found[k] = None;
+            }
+            self.tracer.closest_hits(s, candidates, &reflected.rays, left, &mut stack, &mut found);
+            for k in lanes_of(left) {
+                let is_wanted = found[k].map(|hit| (self.is_visible(scene, &hit, &reflected.rays[k]), hit.distance));
+                match is_wanted {
+                    Some((false, distance)) => reflected.pass(k, distance),
+                    other => {
+                        left &= !(1 << k);
+                        *lanes |= u64::from(other.is_some()) << k;
+                    }
+                }
+            }
         }
-        None
+        for k in lanes_of(left) {
+            found[k] = None;
+        }
+        found
+    }
+
+    /// True if a mirrored ray ends at this surface, or is attenuated by it.
+    #[inline(always)]
+    fn is_visible(&self, scene: &RenderScene, hit: &RayHit, ray: &Ray) -> bool {
+        let instance = &scene.instances()[self.tracer.instance_of(hit) as usize];
+        let culls = scene.opengl.is_some_and(|rules| rules.culls_backs) && instance.group != Marker::GROUP;
+        instance.material.rgba[3] >= 1.0 && !culls
+            || self.tracer.surface(hit).is_some_and(|hit| dot(hit.normal, ray.direction) < 0.0)
     }
 }
 
-impl ReflectedRay {
-    /// Moves the ray past a surface.
-    fn pass(&mut self, distance: f64) {
-        let far = self.ray.origin.iter().fold(distance.max(1.0), |m, x| m.max(x.abs()));
+impl ReflectedRays {
+    const NONE: Self = Self {
+        lanes: 0,
+        rays: [Ray { origin: [0.0; 3], direction: [0.0, 0.0, 1.0] }; LANES],
+        distances: [0.0; LANES],
+        throughputs: [1.0; LANES],
+    };
+
+    /// Moves the ray of lane `k` past a surface.
+    fn pass(&mut self, k: usize, distance: f64) {
+        let ray = &mut self.rays[k];
+        let far = ray.origin.iter().fold(distance.max(1.0), |m, x| m.max(x.abs()));
         let onward = distance + RAY_OFFSET * far;
-        self.ray.origin = self.ray.at(onward);
-        self.distance += onward;
+        ray.origin = ray.at(onward);
+        self.distances[k] += onward;
     }
 }
 
@@ -417,64 +399,4 @@ fn mask<S: Simd>(s: S, bits: u64) -> M<S> {
 #[inline(always)]
 fn add<S: Simd>(s: S, blend: BlendSpace, light: F<S>, byte: F<S>) -> F<S> {
     blend.color_of_bytes(min(max(blend.to_bytes(s, light) + byte, splat(s, 0.0)), splat(s, 255.0)))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::geometry::assets::RayAssetCache;
-    use crate::raster::Layer;
-    use crate::simd::{all_levels, at_level};
-    use kinetoscope_testkit::scenes::{TestRng as SceneRng, random_scene};
-
-    /// Rays that hit an object are traced; most of those that miss all are not.
-    #[test]
-    fn bounds_of_reflections() {
-        let mut rng = crate::geometry::TestRng(5);
-        let (mut hits, mut misses, mut left_out) = (0, 0, 0);
-        for seed in 1..5 {
-            let (scene, poses) = random_scene(&mut SceneRng(seed), 1.0);
-            let mut tracer = RayTracer::default();
-            tracer.prepare_geometry(&scene, &RayAssetCache::default(), |_| Layer::Opaque);
-            tracer.place(&scene, &poses, None);
-            let all = [[-1e3; 3], [1e3; 3]];
-            let bounds = ReflectionBounds::new(all, tracer.round_bounds(), u32::MAX);
-            let bounded = |hit: &Hit| bounds.each.iter().any(|bounds| bounds.instance == hit.instance);
-            for _ in 0..200 {
-                let (mut origins, mut directions) = ([[0.0f32; LANES]; 3], [[0.0f32; LANES]; 3]);
-                for k in 0..LANES {
-                    let (origin, toward) = (rng.point(4.0), rng.point(1.0));
-                    let d = sub(toward, origin);
-                    let d = scale(d, 1.0 / dot(d, d).sqrt());
-                    for axis in 0..3 {
-                        (origins[axis][k], directions[axis][k]) = (origin[axis] as f32, d[axis] as f32);
-                    }
-                }
-                for level in all_levels() {
-                    let found = at_level!(level, s => s.vectorize(#[inline(always)] || {
-                        let v3 = |v: &[[f32; LANES]; 3]| V3 { x: load(s, &v[0]), y: load(s, &v[1]), z: load(s, &v[2]) };
-                        let every = splat(s, 0.0).simd_eq(splat(s, 0.0));
-                        bounds.may_intersect(s, v3(&origins), v3(&directions), every).to_bitmask()
-                    }));
-                    for k in 0..LANES {
-                        let ray = Ray {
-                            origin: origins.map(|axis| f64::from(axis[k])),
-                            direction: directions.map(|axis| f64::from(axis[k])),
-                        };
-                        let mut stack = TraversalStack::default();
-                        let hit = at_level!(all_levels()[0], s => tracer.closest_hit(s, &ray, f64::INFINITY, END_TIME, &mut stack));
-                        let is_followed = found >> k & 1 == 1;
-                        if hit.as_ref().is_some_and(bounded) {
-                            assert!(is_followed, "{ray:?} hits {hit:?}");
-                            hits += 1;
-                        } else {
-                            misses += 1;
-                            left_out += usize::from(!is_followed);
-                        }
-                    }
-                }
-            }
-        }
-        assert!(hits > 1000 && left_out * 4 > misses, "{hits} hits, {left_out} of {misses} misses are left out");
-    }
 }

@@ -5,7 +5,7 @@ use super::corner_light::LitPolygons;
 use super::group::ShadingContext;
 use super::horizon::Horizon;
 use super::light::{Lighting, MAX_LIGHTS, PixelWidth, ShadeContext};
-use super::mirror::{self, Mirrors, ReflectionBounds};
+use super::mirror::{self, Mirrors};
 use super::motion_vectors::MotionVectors;
 use super::shadow::{ShadowBand, ShadowMap};
 use super::shadow_fit::{self, LightView};
@@ -22,7 +22,7 @@ use crate::renderer::Renderer;
 use crate::request::RasterCfg;
 use crate::request::RenderRequest;
 use crate::shutter::Shutter;
-use crate::trace::RayTracer;
+use crate::trace::{Candidates, RayTracer};
 use crate::visibility::{Projection, RenderError, View};
 use kinetoscope_scene::{Instance, Light, LightingSpace, PoseF32, RenderScene};
 use std::cell::RefCell;
@@ -268,6 +268,7 @@ impl PreparedFrame {
         render_request: &RenderRequest<'a>,
         projection: &'a Projection,
         stack: &'a RefCell<&'a mut TraversalStack>,
+        candidates: &'a RefCell<&'a mut Candidates>,
         lit_polygons: &'a RefCell<&'a mut LitPolygons>,
         [surface, albedo, flow]: [bool; 3],
     ) -> ShadingContext<'a> {
@@ -279,11 +280,8 @@ impl PreparedFrame {
             let others = render_request.scene.instances()[first + 1..]
                 .iter()
                 .any(|instance| mirror::reflectance(instance) > 0.0);
-            let bounds = (only_first || !others)
-                .then(|| tracer.bounds_without(first as u32))
-                .flatten()
-                .map(|all| ReflectionBounds::new(all, tracer.round_bounds(), first as u32));
-            Mirrors { tracer, stack, first, only_first, bounds }
+            let bounded = (only_first || !others) && tracer.is_bounded_without(first as u32);
+            Mirrors { tracer, stack, candidates, first, only_first, bounded }
         });
         ShadingContext {
             projection,

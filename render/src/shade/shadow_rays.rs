@@ -3,9 +3,9 @@
 use super::surface::SurfacePointLanes;
 use crate::geometry::bvh::TraversalStack;
 use crate::path::sobol::SobolSequence;
-use crate::simd::{F, LANES, M, Simd, V3, load, splat};
-use crate::trace::RayTracer;
+use crate::simd::{F, LANES, M, Simd, V3, abs, load, splat};
 use crate::trace::motion::END_TIME;
+use crate::trace::{RayTracer, lanes_of};
 use kinetoscope_scene::Ray;
 use kinetoscope_scene::basis::OrthonormalBasis;
 use kinetoscope_scene::sampling::sample_cosine_hemisphere;
@@ -63,13 +63,12 @@ pub(super) fn arrays<S: Simd>(v: V3<S>) -> [[f32; LANES]; 3] {
     [v.x.array(), v.y.array(), v.z.array()]
 }
 
-/// The lanes of a mask.
-pub(super) fn lanes_of(mut bits: u64) -> impl Iterator<Item = usize> {
-    std::iter::from_fn(move || {
-        let k = (bits != 0).then(|| bits.trailing_zeros() as usize)?;
-        bits &= bits - 1;
-        Some(k)
-    })
+/// Origins of rays from surface points, as [`SurfacePoints::offset_origin`], in single precision.
+#[inline(always)]
+pub(super) fn offset_origins<S: Simd>(point: SurfacePointLanes<S>) -> V3<S> {
+    let SurfacePointLanes { position, normal, depth } = point;
+    let far = (depth + abs(position.x) + abs(position.y) + abs(position.z)) * RAY_OFFSET;
+    position.add(normal.scale(far))
 }
 
 impl ShadowRays<'_> {

@@ -9,6 +9,7 @@
 //! There its rays are cast in packets of eight, the nearest instances first. The rays fill the rasterizer's own
 //! visibility buffer, so every channel comes from the same code.
 
+mod group;
 mod instance_bvh;
 pub(crate) mod motion;
 
@@ -21,8 +22,9 @@ use crate::geometry::shape::mesh::MeshBvh;
 use crate::geometry::triangle::ShearedPacket;
 use crate::lens::ViewCone;
 use crate::lens::rays::LensRays;
-use crate::simd::Simd;
+use crate::simd::{self, M, Simd, splat};
 use crate::visibility::Projection;
+pub(crate) use group::{Candidates, RayGroup, lanes_of};
 use instance_bvh::InstanceBvh;
 use kinetoscope_scene::Ray;
 use kinetoscope_scene::shape::{RenderMesh, Shape};
@@ -99,28 +101,30 @@ pub(crate) struct RayTracer {
     /// Unbounded instances, which are outside of the BVH.
     unbounded: Vec<u32>,
     bvh: InstanceBvh,
-    /// Bounds of the bounded instances that do not move during the exposure.
+    /// Bounds of each element of `instances`; [`RoundBounds::ALL`] for unbounded and moving ones.
     round_bounds: Vec<RoundBounds>,
 }
 
 /// Bounds of an instance in the world: a ball, and a cylinder without ends through its center. Both are enlarged by the
 /// error of single precision.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct RoundBounds {
-    pub(crate) instance: u32,
-    pub(crate) center: [f32; 3],
-    pub(crate) radius: f32,
+struct RoundBounds {
+    center: [f32; 3],
+    radius: f32,
     /// Unit vector along the longest side.
-    pub(crate) axis: [f32; 3],
+    axis: [f32; 3],
     /// Radius of the cylinder \[m\].
-    pub(crate) across: f32,
+    across: f32,
 }
 
 impl RoundBounds {
     /// Enlargement, as a fraction of size and coordinates.
     const MARGIN: f64 = 1e-3;
 
-    fn new(instance: u32, pose: &PoseF64, [lo, hi]: [V3; 2]) -> Self {
+    /// Bounds that every ray meets. Squares of the radii are finite.
+    const ALL: Self = Self { center: [0.0; 3], radius: 1e18, axis: [0.0, 0.0, 1.0], across: 1e18 };
+
+    fn new(pose: &PoseF64, [lo, hi]: [V3; 2]) -> Self {
         let half = [0, 1, 2].map(|k| 0.5 * (hi[k] - lo[k]));
         let middle = [0, 1, 2].map(|k| 0.5 * (hi[k] + lo[k]));
         let center: V3 = [0, 1, 2].map(|k| dot(pose.rotation[k], middle) + pose.translation[k]);
@@ -128,12 +132,26 @@ impl RoundBounds {
         let square = dot(half, half);
         let pad = Self::MARGIN * (square.sqrt() + center.iter().fold(0.0f64, |most, x| most.max(x.abs())));
         Self {
-            instance,
             center: center.map(|x| x as f32),
             radius: (square.sqrt() + pad) as f32,
             axis: pose.rotation.map(|row| row[longest] as f32),
             across: ((square - half[longest] * half[longest]).max(0.0).sqrt() + pad) as f32,
         }
+    }
+
+    /// The rays of a group that may hit the instance.
+    #[inline(always)]
+    fn may_intersect<S: Simd>(&self, s: S, RayGroup { origin, direction }: RayGroup<S>) -> M<S> {
+        let to = simd::V3::splat(s, self.center).sub(origin);
+        let (square, along) = (to.dot(to), to.dot(direction));
+        let radius = self.radius * self.radius;
+        // The differences lose digits, in proportion to the distance.
+        let near = (square - along * along).simd_le(square * 1e-6 + radius)
+            & (along.simd_ge(splat(s, 0.0)) | square.simd_le(splat(s, radius)));
+        let across = direction.cross(simd::V3::splat(s, self.axis));
+        let distance = to.dot(across);
+        let limit = (square * 1e-9 + self.across * self.across) * across.dot(across);
+        near & (distance * distance).simd_le(limit + square * 1e-12)
     }
 }
 
@@ -143,6 +161,25 @@ impl InstanceGeometry {
         match known {
             Some(Self::Mesh(of, tree)) if Arc::ptr_eq(&of, mesh) => Self::Mesh(of, tree),
             _ => Self::Mesh(Arc::clone(mesh), assets.mesh(mesh)),
+        }
+    }
+
+    /// Nearest hit of a ray in the frame of the instance at a distance from 0 to `limit` \[m\]; `None` without one.
+    #[inline(always)]
+    fn intersect(&self, instance_index: u32, local: &Ray, limit: f64, stack: &mut TraversalStack) -> Option<RayHit> {
+        match self {
+            Self::Mesh(_, tree) => {
+                let (distance, index) = tree.closest_hit(local, limit, None, stack)?;
+                Some(RayHit { instance_index, distance, index, normal: [0.0; 3] })
+            }
+            Self::Closed(shape) => {
+                let at = shape.intersect(local, limit)?;
+                // These shapes are convex around their origin: the position of a surface point is its outward
+                // direction. Points of a plane have no height, so planes are excluded.
+                let inward = dot(at.normal, local.at(at.t)) < 0.0 && !shape.is_one_sided();
+                let normal = scale(at.normal, if inward { -1.0 } else { 1.0 });
+                Some(RayHit { instance_index, distance: at.t, index: 0, normal })
+            }
         }
     }
 
@@ -209,28 +246,27 @@ impl RayTracer {
             let motion = before.and_then(|before| Motion::between(before.get(k)?, &poses[k]));
             let casts_shadow = scene.instances()[k].group != Marker::GROUP;
             things.push(TracedInstance { instance: k as u32, world_from_instance, motion, alpha, casts_shadow });
-            match (body.bounds(), motion) {
+            round_bounds.push(match (body.bounds(), motion) {
                 (Some(bounds), None) => {
                     bvh.add(thing, &world_from_instance, bounds);
-                    round_bounds.push(RoundBounds::new(k as u32, &world_from_instance, bounds));
+                    RoundBounds::new(&world_from_instance, bounds)
                 }
-                (Some(bounds), Some(motion)) => bvh.add_moving(thing, &motion, bounds),
-                (None, _) => unbounded.push(thing),
-            }
+                (Some(bounds), Some(motion)) => {
+                    bvh.add_moving(thing, &motion, bounds);
+                    RoundBounds::ALL
+                }
+                (None, _) => {
+                    unbounded.push(thing);
+                    RoundBounds::ALL
+                }
+            });
         }
         bvh.build();
     }
 
-    /// Bounding box of all bounded instances that are not hidden, over the whole shutter time, in the world \[m\];
-    /// (+inf, -inf) without a bounded instance. `None` if an instance other than `instance` is unbounded.
-    pub(crate) fn bounds_without(&self, instance: u32) -> Option<[V3; 2]> {
-        let alone = self.unbounded.iter().all(|&thing| self.instances[thing as usize].instance == instance);
-        alone.then(|| self.bvh.bounds().unwrap_or([[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]]))
-    }
-
-    /// Bounds of the bounded instances that are not hidden, without motion.
-    pub(crate) fn round_bounds(&self) -> &[RoundBounds] {
-        &self.round_bounds
+    /// True if all instances that are not hidden have bounds, but for `instance`.
+    pub(crate) fn is_bounded_without(&self, instance: u32) -> bool {
+        self.unbounded.iter().all(|&thing| self.instances[thing as usize].instance == instance)
     }
 
     /// Pose of an instance in the world at a time from 0 to [`END_TIME`](motion::END_TIME); `None` for hidden
@@ -254,14 +290,12 @@ impl RayTracer {
         s.vectorize(
             #[inline(always)]
             || {
-                let (mut best, mut limit): (Option<HitCandidate>, f64) = (None, limit);
+                let (mut best, mut limit): (Option<RayHit>, f64) = (None, limit);
                 let mut meet = {
                     #[inline(always)]
                     |thing: u32, limit: f64| {
                         let Some(found) = self.intersect(thing, ray, limit, time, stack) else { return limit };
-                        if best.is_none_or(|b| {
-                            found.distance < b.distance || found.distance == b.distance && thing > b.instance_index
-                        }) {
+                        if best.is_none_or(|best| found.precedes(&best)) {
                             best = Some(found);
                         }
                         limit.min(found.distance)
@@ -355,26 +389,25 @@ impl RayTracer {
         limit: f64,
         time: f64,
         stack: &mut TraversalStack,
-    ) -> Option<HitCandidate> {
+    ) -> Option<RayHit> {
         let placed @ TracedInstance { instance, .. } = &self.instances[instance_index as usize];
         let local = ray.inverse_transformed_by(&placed.at(time));
-        match self.geometries[*instance as usize].as_ref()? {
-            InstanceGeometry::Mesh(_, tree) => {
-                let (distance, index) = tree.closest_hit(&local, limit, None, stack)?;
-                Some(HitCandidate { instance_index, distance, index, normal: [0.0; 3] })
-            }
-            InstanceGeometry::Closed(shape) => {
-                let at = shape.intersect(&local, limit)?;
-                // These shapes are convex around their origin: the position of a surface point is its outward
-                // direction. Points of a plane have no height, so planes are excluded.
-                let inward = dot(at.normal, local.at(at.t)) < 0.0 && !shape.is_one_sided();
-                let normal = scale(at.normal, if inward { -1.0 } else { 1.0 });
-                Some(HitCandidate { instance_index, distance: at.t, index: 0, normal })
-            }
-        }
+        self.geometries[*instance as usize].as_ref()?.intersect(instance_index, &local, limit, stack)
     }
 
-    fn hit(&self, found: HitCandidate, time: f64) -> Option<Hit> {
+    /// Index of the instance of a hit in the scene.
+    #[inline(always)]
+    pub(crate) fn instance_of(&self, hit: &RayHit) -> u32 {
+        self.instances[hit.instance_index as usize].instance
+    }
+
+    /// The surface of a hit on a static instance.
+    #[inline(always)]
+    pub(crate) fn surface(&self, hit: &RayHit) -> Option<Hit> {
+        self.hit(*hit, motion::END_TIME)
+    }
+
+    fn hit(&self, found: RayHit, time: f64) -> Option<Hit> {
         let placed @ TracedInstance { instance, .. } = &self.instances[found.instance_index as usize];
         let world_from_instance = placed.at(time);
         let (triangle, normal) = match self.geometries[*instance as usize].as_ref()? {
@@ -448,15 +481,24 @@ impl RayTracer {
     }
 }
 
-/// The nearest hit so far, as far as needed for comparisons.
+/// Hit of a ray, as far as needed for comparisons.
 #[derive(Clone, Copy, Debug)]
-struct HitCandidate {
+pub(crate) struct RayHit {
+    /// Index in [`RayTracer::instances`].
     instance_index: u32,
-    distance: f64,
+    /// Distance \[m\].
+    pub(crate) distance: f64,
     /// Position of the triangle in its BVH.
     index: usize,
     /// Outward normal of a closed form, in its own frame.
     normal: V3,
+}
+
+impl RayHit {
+    /// True if this hit counts rather than `other`: it is nearer, or as near on a later instance.
+    fn precedes(&self, other: &Self) -> bool {
+        self.distance < other.distance || self.distance == other.distance && self.instance_index > other.instance_index
+    }
 }
 
 /// Bounding cone of an instance, from bounds in its own frame.
