@@ -181,7 +181,7 @@ def test_mimic_joints_move_with_their_drivers(tmp_path):
         np.testing.assert_allclose(matrix(chain.compute_fk([q])[0]), body_pose(model, data, "left_index_dist"), atol=1e-9)
         columns = [body_jacobian(model, data, "left_index_dist", joint) for joint in (driver, "LEFT_INDEX_PIP")]
         np.testing.assert_allclose(chain.jacobian([q])[0, :, 0], columns[0] + factor * columns[1], atol=1e-9)
-    # The range of the driver ends where that of its follower ends.
+    # The range of the driver is that of the robot in a simulation.
     with ks.SimulationManager(num_envs=1, threads=1) as sim:
         robot = sim.add_robot(ks.RobotCfg(urdf=HAND))
         np.testing.assert_array_equal(chain.qpos_limits[0], robot.qpos_limits[0, robot.find_joints(driver)[0]])
@@ -273,9 +273,9 @@ def test_other_threads_run_during_a_call(arm, method):
         spent.append(time.perf_counter() - start)
 
     thread = threading.Thread(target=compute)
+    counted, longest, last = 0, 0.0, time.perf_counter()
     thread.start()
     began.wait()
-    counted, longest, last = 0, 0.0, time.perf_counter()
     while thread.is_alive():
         time.sleep(0.001)
         now = time.perf_counter()

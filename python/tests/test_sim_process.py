@@ -108,7 +108,8 @@ def test_ctrl_c_ends_the_wait_for_another_thread(name, tmp_path):
 def test_times_of_a_playback_that_another_thread_plays(tmp_path):
     """Reading them waits for nothing. ``seek`` needs the simulation, and Ctrl+C ends its wait."""
     code = (
-        "import os, threading, time\nimport kinetoscope as ks\n" + PREPARED["play"] + "playback = ks.Playback('short.npz', sim)\n"
+        # A read that waits ends the process, which the test sees as a missing line.
+        "import os, signal, threading, time\nimport kinetoscope as ks\nsignal.alarm(30)\n" + PREPARED["play"] + "playback = ks.Playback('short.npz', sim)\n"
         "before = list(playback.times), [playback.frame_at(time) for time in (-1.0, 0.1, 99.0)]\n"
         "thread = threading.Thread(target=playback.play, daemon=True)\nthread.start()\ntime.sleep(0.5)\n"
         "started = time.perf_counter()\n"
