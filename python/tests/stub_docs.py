@@ -14,7 +14,7 @@ from types import ModuleType
 from typing import Any
 
 # Files of the stub: the module, and those of the classes that it imports.
-STUBS = ("_sim.pyi", "_sim_entities.pyi", "_sim_views.pyi")
+STUBS = ("_sim.pyi", "_sim_entities.pyi", "_sim_kinematics.pyi", "_sim_views.pyi")
 # Length of lines.
 WIDTH = 120
 

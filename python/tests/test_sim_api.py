@@ -1,15 +1,12 @@
-"""The Python package has the methods of the Rust types that programs get: a Rust method without a name in Python fails here until
-it gets one, or a reason."""
+"""The Python package has the methods of the Rust types that programs get, and the free functions: a Rust method or function
+without a name in Python fails here until it gets one, or a reason."""
 
-import re
-from pathlib import Path
+from functools import cache, reduce
 
+from rust_api import rust_api
 from test_sim_sensors import scene  # noqa: F401, the fixture
 
 import kinetoscope as ks
-
-PROJECT = Path(__file__).parents[2]
-CRATES = ("record", "sensors", "sim", "tasks", "viewer")
 
 # Rust types that programs get from a simulation, with the Python classes that have their methods.
 VIEWS = {
@@ -17,12 +14,16 @@ VIEWS = {
     "CameraPlacement": [ks.Sensor],
     "ContactSensor": [ks.Sensor],
     "ActuatorState": [ks.Sensor],
+    "Chain": [ks.KinematicChain],
+    "Dynamics": [ks.Robot],
     "Entities": [ks.SimulationManager, ks.Sensor],
     "Env": [ks.Task],
     "EnvProperties": [ks.SimulationManager],
     "EnvPropertiesMut": [ks.SimulationManager],
+    "FileRecording": [ks.FileRecording],
     "FoxgloveServer": [ks.FoxgloveServer],
     "FrameTransformer": [ks.Sensor],
+    "IkSolver": [ks.KinematicChain],
     "ImageWindow": [ks.ImageWindow],
     "Imu": [ks.Sensor],
     "InteractiveScene": [ks.SimulationManager, ks.Sensor],
@@ -60,6 +61,7 @@ VIEWS = {
     "StereoCamera": [ks.Sensor],
     "StreamToFoxglove": [ks.SimulationManager],
     "Terrain": [ks.Terrain],
+    "TerrainGrid": [ks.TerrainGrid],
     "Viewer": [ks.Viewer],
     "ViewerExt": [ks.SimulationManager],
     "Warnings": [ks.SimulationManager],
@@ -71,20 +73,30 @@ VIEWS = {
 # Exported types with methods that are not in Python as classes, by reason.
 NOT_VIEWS = {
     "configurations and parts of them, which are dataclasses, dicts or texts in Python": """
-        CameraConvention CameraInfo ContactSensorCfg DelayedPd EnvSelection Extrinsics FoxgloveCfg FrameTransformerCfg ImuCfg Integrator LightCfg MjcfFile
-        MjcfPartCfg NoiseCfg ObjectShape OrbitCamera Overlays Property Randomization RayAlignment RayPattern RecorderCfg SamplingCfg
-        SceneCfg SegmentationCfg Shard SimulationManagerCfg StereoCameraCfg SurfaceCfg TargetFrameCfg TaskCfg TerrainCfg AutoresetMode""",
+        Boxes CameraConvention CameraInfo ComponentCfg ContactSensorCfg DelayedPd DiscreteObstacles EnvSelection Extrinsics Flat FoxgloveCfg
+        FrameTransformerCfg Gap IkCfg ImuCfg Integrator LightCfg MjcfFile MjcfPartCfg NameCase NoiseCfg NullSpacePosture ObjectShape OrbitCamera
+        Overlays Property PyramidSlope PyramidStairs Randomization RayAlignment RayPattern RecorderCfg RoughTerrain SamplingCfg SceneCfg
+        SegmentationCfg Shard SimulationManagerCfg Slope SteppingStones StereoCameraCfg SurfaceCfg TargetFrameCfg TaskCfg TerrainCfg TerrainTile
+        TipFrame UrdfCfg Waves AutoresetMode""",
     "results that are dicts, tuples or texts in Python": """
-        Box3d Closed DistortionModel EndedEpisode FieldSelector Format ImageBatch MaskId Occlusion Rectification RobotReport
-        SegmentedEntity Space StreamField StreamSchema Topic EventKind""",
+        Box3d Closed Diagnostic DiagnosticKind DistortionModel EndedEpisode FieldSelector Format ImageBatch MaskId Occlusion Rectification
+        ReplayResult RobotReport SegmentedEntity SourceLocation Space StreamField StreamSchema Topic EventKind""",
+    "parts of the description of a robot: Robot.description and inspect have their values": """
+        Configuration CouplingPolynomial HullSet JointKind Link MeshKey RigidInertia RobotDescription Tree""",
     "pixels and arrays, which are NumPy arrays in Python": "Canvas History RayImages RobotState",
+    "poses and files of arrays, which are NumPy arrays in Python, too": "ElementType NpyElement PoseF32 PoseF64",
+    "random numbers, which numpy.random has in Python": "AreaSampling KeyedRng OrthonormalBasis Philox",
+    "meshes, which the packages trimesh and scipy have in Python; simulations read the files": "HullCache RenderMesh TextureSource TriMesh",
     "traits and types with which Rust programs add sensors, tasks, entities or viewers of their own": """
-        ActionTerm AnySensorCfg AnySensorId CommandTerm CurriculumTerm DevicePhysics DriveMode EntityTypes EnvBuilder EpisodeRng EventContext
+        ActionTerm AnySensorCfg AnySensorId CommandTerm Contacts CurriculumTerm DevicePhysics EntityTypes EnvBuilder EpisodeRng EventContext
         EventTerm ImageTerm ObservationTerm Observer Observers ObserversMut Phases PlaybackSource Poses RecordButton RecordControl
-        RewardTerm SampleChannel Sampler Schedule Sensor SensorCfg SensorContext SensorSlot StateRequirements StepResult TermArgs
-        TermContext TermRegistry TerminationTerm VectorEnv""",
-    "scenes for renderers, which kinetoscope-render has": "OffscreenScene VisualScene",
-    "modules that other crates of the project use": "App Mjcf",
+        RewardTerm SampleChannel Sampler SceneState Schedule Sensor SensorCfg SensorContext SensorSlot SensorTypeVisitor StateFields
+        StateRequirements StepResult TermArgs TermContext TermRegistry TerminationTerm VectorEnv""",
+    "scenes for renderers, which kinetoscope-render has": """
+        CameraFit ClosedForm ClosedFormVisitor Headlight Instance Marker Material MipLevel OffscreenScene PlaneLines Ray RenderScene Sky Texture
+        Triangulated TriangleSampling VisualScene""",
+    "modules that other crates of the project use": "App AtomicFile LineStarts Pattern Value",
+    "a flag of Rust programs; SimulationManager.stream_to_foxglove has the server": "FoxgloveStream",
 }
 
 # Rust methods with another name in Python, or a name of which they are a part.
@@ -94,7 +106,13 @@ RENAMED = {
     "ActuatorState.force_history": "history",
     "Camera.channel": "__getitem__",
     "Camera.frame_counts": "sample_counts",
+    "Chain.between": "__new__",
+    "Chain.is_moved_by": "joint_names",
+    "Chain.new": "__new__",
+    "Chain.pose": "compute_fk",
+    "Chain.variables": "dof",
     "ContactSensor.body_names": "columns",
+    "Dynamics.dof_count": "dof",
     "Entities.articulated_id": "__getitem__",
     "Entities.articulated_uids": "keys",
     "Entities.articulation_id": "__getitem__",
@@ -114,6 +132,8 @@ RENAMED = {
     "EnvPropertiesMut.set": "set_property",
     "FoxgloveServer.address": "url",
     "FrameTransformer.target_frame_names": "columns",
+    "IkSolver.new": "compute_ik",
+    "IkSolver.solve": "compute_ik",
     "ImageWindow.open": "__new__",
     "ImageWindow.window": "is_open",
     "InteractiveScene.new": "from_scene",
@@ -198,14 +218,20 @@ LEFT_OUT = {
     "Camera.render_count": "a measure for tests of laziness",
     "Camera.renders_markers": GIVEN,
     "Camera.view": "pose_w and intrinsic_matrices",
+    "Chain.reduce_into": "joints that do not move the tip have no column",
+    "Chain.reduced": "joints that do not move the tip have no column",
     "ContactSensor.find_bodies": LIST,
     "ContactSensor.force_threshold": GIVEN,
+    "Dynamics.dof_range": "the columns are those of mass_matrix",
+    "Dynamics.new": "a robot of a simulation has the methods, and inspect the values without one",
     "Env.cfg": GIVEN,
     "Env.context": "for terms written in Rust",
     "Env.into_sim": "the simulation of a task is usable after close",
     "EnvProperties.bytes": "a measure for tests of memory",
     "EnvProperties.of": "property has the values of all environments",
     "EnvPropertiesMut.randomize_with": "a function of Rust per environment; set_property takes NumPy arrays",
+    "FileRecording.new": "made by SimulationManager.file_recording",
+    "IkSolver.chain": "the chain has the solver",
     "InteractiveScene.into_sim": "a SimulationManager is a scene, too",
     "JointState.joints": LIST,
     "MjcfPart.cfg": GIVEN,
@@ -247,7 +273,6 @@ LEFT_OUT = {
     "Segmentation.colorize_segments": "colorize takes the mask",
     "Segmentation.new": "made by SimulationManager.segmentation",
     "Segmentation.segment_into": "NumPy arrays are new; ids are copied once",
-    "SimulationManager.batch": "for tests and benchmarks of the project",
     "SimulationManager.entities": READS,
     "SimulationManager.observers": EXTENSION,
     "SimulationManager.properties": READS,
@@ -259,6 +284,8 @@ LEFT_OUT = {
     "SimulationManager.mjcf_part": READS,
     "SimulationManager.with_mujoco": MUJOCO,
     "StereoCamera.left_from_right": GIVEN,
+    "TerrainGrid.tile": "the shares of the tiles, which the program gave",
+    "TerrainGrid.tile_seed": "for heights, which compute it",
     "Viewer.add_viewer": "SimulationManager.viewer",
     "Viewer.has_ended": "a call of an ended simulation raises",
     "Viewer.set_request": "snapshots of viewers are not in Python",
@@ -268,27 +295,75 @@ LEFT_OUT = {
 }
 
 
+# Exported functions of Rust, by crate, with their names in Python.
+FUNCTIONS = {
+    "record": {
+        "frame_at": "Playback.frame_at",
+        "recover": "recover",
+        "recover_to": "recover",
+        "verify": "SimulationManager.verify_recording",
+        "verify_until": "SimulationManager.verify_recording",
+    },
+    "robot": {
+        "assemble": "assemble_urdf",
+        "link_poses": "KinematicChain.compute_link_fk",
+        "own_limit": "KinematicChain.qpos_limits",
+        "parse_file": "inspect",
+        "parse_file_with": "inspect",
+        "position_ranges": "KinematicChain.qpos_limits",
+        "write_urdf": "assemble_urdf",
+    },
+    "sensors": {"look_at_pose": "Placement.look_at"},
+    "sim": {
+        "describe": "KinematicChain.__new__",
+        "inspect": "inspect",
+        "rollout_until": "SimulationManager.rollout",
+        "update_until": "SimulationManager.update",
+    },
+    ".": {
+        "path": "asset",
+        "quadruped": "bundled_robot",
+        "revo1_left": "bundled_robot",
+        "sr5": "bundled_robot",
+        "sr5_with_hand": "bundled_robot",
+    },
+}
+# Exported functions that are not in Python, by crate and reason.
+FUNCTIONS_LEFT_OUT = {
+    ("record", "the program that built the recorded simulation gave the number"): "num_envs",
+    ("robot", "steps of add_robot and inspect"): "complete count_by_name fuse planar_axes rigid_bodies solid_ball_inertial",
+    ("robot", "functions of Python read files, which may be temporary"): "parse_str parse_str_with",
+    ("robot", "the text is easy to change: str.replace, or xml.etree"): "write_urdf_with",
+    ("scene", "vectors, poses and quaternions, which NumPy and scipy.spatial.transform compute"): """
+        add add_scaled cos_sin_turns cross dot from_row from_wxyz from_xyz_rpy from_xyzw norm normalize scale sub to_f64 to_row to_wxyz
+        try_normalize""",
+    ("scene", "meshes, which the packages trimesh, scipy and coacd have; configurations of objects name files, hulls and pieces"): """
+        convex_decomposition convex_hull load load_bytes load_with prisms smooth_normals write_binary_stl write_obj""",
+    ("scene", "files of arrays, which NumPy reads and writes"): "header write",
+    ("scene", "names, patterns and files, which the classes check themselves"): """
+        assign closest_names format_candidates parse read_named read_named_text read_referenced read_referenced_text select similar_name
+        strip_env_prefix""",
+    ("scene", "for renderers"): "decode_srgb sample_cosine_hemisphere sample_disk",
+    ("sensors", "colors of viewers and videos; Segmentation.colorize, and color maps of matplotlib"): """
+        depth_color mask_color normal_color segment_color""",
+    ("sim", "for packages with the physics of a device; this one has its own"): "set_device_opener",
+    ("tasks", "terms are dicts with their names"): """
+        action_rate generated_commands is_alive joint_efforts joint_pos_rel joint_vel last_action relative_joint_positions""",
+    ("tasks", "for terms written in Rust"): "env_ids",
+    ("tasks", "for environments written in Rust; gymnasium.utils.env_checker checks those of Python"): "check",
+    ("viewer", "plots, which matplotlib draws; read_series has the numbers"): "canvas write",
+    (".", "the environment variable KINETOSCOPE_ASSETS names the folder"): "set_folder",
+}
+
+
+@cache
+def api():
+    return rust_api()
+
+
 def rust_methods():
     """Public methods of the exported types and traits, by type: a set of names each."""
-    exported, methods = set(), {}
-    sources = [path for crate in CRATES for path in sorted((PROJECT / crate / "src").rglob("*.rs"))]
-    for path in sources:
-        if path.name in ("lib.rs", "mod.rs"):
-            for names in re.findall(r"^\s*pub use ([^;]*);", path.read_text(), re.MULTILINE):
-                exported |= set(re.findall(r"\b[A-Z]\w+", names))
-        # Types of the macro that declares numeric sensors.
-        for names in re.findall(r'^    "\w+" => \w+::\{([^}]*)\},', path.read_text(), re.MULTILINE):
-            exported |= set(re.findall(r"\b[A-Z]\w+", names))
-    for path in (path for path in sources if "tests" not in path.parts):
-        owner, is_trait = None, False
-        for line in path.read_text().split("\n"):
-            begin = re.match(r"(?:impl(?:<.*?>)?\s+(\w+)(?:<.*?>)?\s*(?:where.*)?\{|pub trait (\w+)|\})", line)
-            if begin:
-                owner, is_trait = begin[1] or begin[2], begin[2] is not None
-            method = re.match(r"    (pub )?(?:const )?fn (\w+)", line)
-            if method and owner in exported and (is_trait or method[1]):
-                methods.setdefault(owner, set()).add(method[2])
-    return methods
+    return api()[0]
 
 
 def test_every_type_is_known():
@@ -328,3 +403,28 @@ def test_every_method_has_a_name_in_python(scene):  # noqa: F811
     assert not missing, f"without a name in Python or a reason: {missing}"
     assert not stale, f"reasons that are not needed any more: {sorted(stale)}"
     assert not set(RENAMED) & set(LEFT_OUT)
+
+
+def test_every_function_has_a_name_in_python():
+    """A new exported function gets a name in Python, or a place in the table of reasons."""
+    functions = api()[1]
+    assert sum(map(len, functions.values())) > 90
+    left_out = [(crate, name) for (crate, _), names in FUNCTIONS_LEFT_OUT.items() for name in names.split()]
+    named = [(crate, name) for crate, names in FUNCTIONS.items() for name in names]
+    known = [*left_out, *named]
+    assert len(known) == len(set(known))
+    found = {(crate, name) for crate, names in functions.items() for name in names}
+    assert found - set(known) == set(), "functions without a name in Python or a reason"
+    assert set(known) - found == set(), "functions of the tables that do not exist"
+    for names in FUNCTIONS.values():
+        for path in names.values():
+            assert callable(reduce(getattr, path.split("."), ks)) or path == "KinematicChain.qpos_limits", path
+
+
+def test_exported_items_are_found():
+    """Controls of the search in the sources: items of public modules, names of nested lists, and nothing of private modules."""
+    methods, functions = api()
+    assert {"RobotDescription", "Chain", "TriMesh", "FileRecording", "SimulationManager"} <= set(methods)
+    assert {"between", "pose"} <= methods["Chain"] and "build" not in methods["Chain"]
+    assert "link_poses" in functions["robot"] and "mimic_relations" not in functions["robot"] and "describe" in functions["sim"]
+    assert "JointPlan" not in methods and "write_urdf" in functions["robot"]

@@ -7,6 +7,7 @@ import re
 import tomllib
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import kinetoscope as ks
@@ -423,7 +424,6 @@ def test_declared_names_are_complete():
 
 
 def test_values_of_other_types():
-    np = pytest.importorskip("numpy")
     cube = {"type": "rigid_object", "rgba": np.array([0.5, 0.5, 0.5, 1]), "mass": np.float32(2), "shape": {"box": {"size": (1, 1, 1)}}}
     found = tomllib.loads(ks.to_toml({"entities": {"x": cube}}))["entities"]["x"]
     assert found["mass"] == 2.0 and found["rgba"] == [0.5, 0.5, 0.5, 1.0]
@@ -477,3 +477,73 @@ def test_documentation_has_the_words_of_python():
     for owner, name in names:
         cls = getattr(ks, owner)
         assert hasattr(cls, name) or name in getattr(cls, "__dataclass_fields__", {}), f"{owner}.{name}"
+
+
+def test_terrain_grids_compute_their_tiles():
+    """Against the heights that a simulation has, and closed forms: 3 x 2 tiles of 4 x 2 m in a border of 1 m."""
+    tiles = [ks.TileShare(tile=ks.TerrainTile.stairs_up(ks.StairsTile(step_height=[0.1, 0.2]))), ks.TileShare(tile=ks.TerrainTile.flat())]
+    own = ks.TerrainGrid(tile_size=[4, 2], rows=3, columns=2, platform=0.8, border=1, tiles=tiles, difficulty=[0.2, 0.8])
+    with ks.SimulationManager(num_envs=1, threads=1, ground=None) as sim:
+        terrain = sim.add_terrain(heights=ks.TerrainGenerator.grid(own))
+        heights = terrain.heights
+        at = np.array([[terrain.height_at(*own.tile_center(row, column)) for column in range(2)] for row in range(3)])
+    assert own.heights().tobytes() == heights.tobytes()
+    assert own.size() == (3 * 4 + 2, 2 * 2 + 2)
+    np.testing.assert_allclose(np.array(own.size())[::-1], (np.array(heights.shape) - 1) * own.cell)
+    assert [own.tile_center(row, column) for row, column in ((0, 0), (1, 1), (2, 0))] == [(-4, -1), (0, 1), (4, -1)]
+    np.testing.assert_allclose([own.row_difficulty(row) for row in range(3)], [0.2, 0.5, 0.8])
+    # The center of a platform is its highest point, (4 - 0.8) / 2 / 0.3 or (2 - 0.8) / 2 / 0.3 steps above the rim.
+    platforms = own.platform_heights()
+    assert platforms.shape == (3, 2) and (platforms[:, 1] == 0).all()
+    np.testing.assert_allclose(platforms, at, atol=1e-6)
+    np.testing.assert_allclose(platforms[:, 0] / platforms[0, 0], [1, 0.15 / 0.12, 0.18 / 0.12])
+    for row in range(3):
+        for column in range(2):
+            x, y = own.tile_center(row, column)
+            assert {own.tile_at(x + dx, y + dy) for dx in (-1.9, 1.9) for dy in (-0.9, 0.9)} == {(row, column)}
+    assert own.tile_at(6.5, 0) is None and own.tile_at(0, -2.1) is None
+    with pytest.raises(ks.ArgumentError, match="is not a point"):
+        own.tile_at(float("nan"), 0)
+    with pytest.raises(ks.ConfigError, match="terrain grid"):
+        ks.TerrainGrid(tile_size=[4, 2], cell=0.3).heights()
+    with pytest.raises(OverflowError):
+        own.tile_center(-1, 0)
+
+
+def test_origins_of_environments_without_a_simulation():
+    """Seven environments: two columns in four rows along -x, with 3 m between neighbors."""
+    own = ks.SimulationManagerCfg(num_envs=7, arena_space=3, threads=1)
+    expected = [[4.5 - 3 * (k // 2), 3 * (k % 2) - 1.5, 0] for k in range(7)]
+    np.testing.assert_array_equal(own.env_origins(), expected)
+    with ks.SimulationManager(own) as sim:
+        np.testing.assert_array_equal(sim.env_origins, expected)
+
+
+def test_matrices_of_intrinsics():
+    """Against the camera of a simulation, and closed forms."""
+    sensor = ks.Intrinsics.aperture(focal_length=24.0, horizontal_aperture=20.0, vertical_aperture=7.5, horizontal_offset=-1.0, vertical_offset=0.5)
+    forms = {
+        "aperture": (sensor, [[768, 0, 288], [0, 1536, 272], [0, 0, 1]]),
+        "pixels": (ks.Intrinsics.pixels(fx=500, fy=510, cx=300, cy=200), [[500, 0, 300], [0, 510, 200], [0, 0, 1]]),
+        # A right angle: half the height is the focal length.
+        "fovy": (ks.Intrinsics.fovy(radians=np.pi / 2), [[240, 0, 320], [0, 240, 240], [0, 0, 1]]),
+    }
+    with ks.SimulationManager(num_envs=1, threads=1) as sim:
+        for name, (intrinsics, expected) in forms.items():
+            matrix = ks.Intrinsics.matrix(intrinsics, 640, 480)
+            np.testing.assert_allclose(matrix, expected, rtol=1e-14)
+            camera = sim.add_sensor(name, ks.CameraCfg(intrinsics=intrinsics, width=640, height=480))
+            np.testing.assert_array_equal(camera.intrinsic_matrices[0], matrix)
+            (fx, _, cx), (_, fy, cy), _ = matrix
+            assert ks.Intrinsics.from_matrix(matrix.tolist()) == {"pixels": {"fx": fx, "fy": fy, "cx": cx, "cy": cy}}
+    for wrong, message in (
+        ([[1, 0.1, 2], [0, 1, 2], [0, 0, 1]], "0.1"),
+        ([[0, 0, 2], [0, 1, 2], [0, 0, 1]], "fx of the lens is 0; it must be positive and finite"),
+        ([[1, 0, 2]], r"from_matrix, matrix: the shape is \[1, 3\]; expected \(3, 3\)"),
+    ):
+        with pytest.raises(ks.ArgumentError, match=message):
+            ks.Intrinsics.from_matrix(wrong)
+    with pytest.raises(ks.ArgumentError, match="vertical angle"):
+        ks.Intrinsics.matrix(ks.Intrinsics.fovy(radians=4.0), 640, 480)
+    with pytest.raises(ks.ConfigError, match="unknown variant `fov`"):
+        ks.Intrinsics.matrix({"fov": {"radians": 1.0}}, 640, 480)

@@ -31,7 +31,8 @@ OWN = {
 PLAIN = {
     "FoxgloveServer": "clients url __repr__",
     "ImageWindow": "close frame_count is_open __enter__ __exit__ __repr__",
-    "Playback": "sim",
+    "KinematicChain": "base diagnostics dof joint_names link_names qpos_limits reach tip __repr__",
+    "Playback": "joints_without_data sim times __len__ __repr__",
     "Recorder": "path __repr__ __enter__",
     "RenderProgress": "cancel fraction is_canceled rays resume samples total __repr__",
     "Robot": "kind",
@@ -64,7 +65,7 @@ def world_of(folder, display):
         "MjcfPart": part, "Sensor": camera, "RenderProgress": camera.progress, "Segmentation": sim.segmentation(), "Snapshot": sim.snapshot(),
         "Recorder": sim.record(folder / "new.npz", overwrite=True), "FileRecording": sim.file_recording(folder / "files.npz"), "FoxgloveServer": sim.stream_to_foxglove("127.0.0.1:0"),
         "Server": sim.serve(), "Viewer": sim.viewer(), "Window": sim.open_window(display=display),
-        "ImageWindow": ks.ImageWindow(display=display), "Playback": ks.Playback(path, sim), "Weld": weld,
+        "ImageWindow": ks.ImageWindow(display=display), "KinematicChain": ks.KinematicChain(ks.asset("cabinet/cabinet.urdf"), "drawer"), "Playback": ks.Playback(path, sim), "Weld": weld,
     }  # fmt: skip
     world["Task"] = ks.Task(sim, task_cfg())
     return world
@@ -147,6 +148,7 @@ def is_usable(world):
 
 FUNCTIONS = {
     "asset_path": lambda folder: _sim.asset_path("sr5/SR5.urdf"),
+    "assemble_urdf": lambda folder: ks.assemble_urdf(ks.asset("sr5/SR5.urdf")),
     "bundled_robot": lambda folder: _sim.bundled_robot("sr5"),
     "inspect": lambda folder: ks.inspect(mjcf={"text": "<mujoco/>"}),
     "json_schema": lambda folder: ks.json_schema(),
@@ -160,6 +162,7 @@ FUNCTIONS = {
     "SimulationManager.from_scene": lambda folder: ks.SimulationManager.from_scene({}),
     "Snapshot.from_bytes": lambda folder: ks.Snapshot.from_bytes(b""),
     "Snapshot.load": lambda folder: ks.Snapshot.load(folder / "x"),
+    "KinematicChain": lambda folder: ks.KinematicChain(ks.asset("sr5/SR5.urdf"), "base_link"),
     "Playback": lambda folder: ks.Playback(folder / "x.npz"),
     "Task": lambda folder: ks.Task(cart_sim()[0], task_cfg()),
     "ImageWindow": lambda folder: ks.ImageWindow(),

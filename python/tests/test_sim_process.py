@@ -30,6 +30,8 @@ LONG_CALLS = {
     "verify_recording": ("replayed.verify_recording('run.npz')", "replayed.time[0] > 0"),
     "step": ("task.step(np.zeros((64, 6)))", "not stepped() and task.reset()[0].shape == (64, 6)"),
     "play": ("ks.Playback('short.npz', sim).play()", "sim.time[0] == 0"),
+    # Targets out of reach use all starts.
+    "compute_ik": ("chain.compute_ik(far)", "chain.compute_ik(far[0], {'num_seeds': 1}).success.tolist() == [False]"),
 }
 PREPARED = {
     "verify_recording": (
@@ -47,6 +49,7 @@ PREPARED = {
         "    try:\n        return task.step(np.zeros((64, 6)))\n"
         "    except ks.ArgumentError as error:\n        assert 'reset' in str(error)\n"
     ),
+    "compute_ik": "chain = ks.KinematicChain(ks.bundled_robot('sr5'), 'ee_link')\nfar = np.tile([9.0, 0, 0, 1, 0, 0, 0], (10_000, 1))\n",
     "play": "with ks.SimulationManager(threads=1) as short:\n    short.add_rigid_object(uid='a')\n    with short.record('short.npz'):\n        short.update(500)\nsim = ks.SimulationManager(threads=1)\nsim.add_rigid_object(uid='a')\n",
 }
 
@@ -98,6 +101,26 @@ def test_ctrl_c_ends_the_wait_for_another_thread(name, tmp_path):
         "time.sleep(0.5)\nprint('ready', flush=True)\n"
         f"try:\n    {WAITING_CALLS[name]}\nexcept KeyboardInterrupt:\n"
         "    print('interrupted', time.time(), thread.is_alive() and 'in use' in repr(sim), flush=True)\nos._exit(0)\n"
+    )
+    assert_interrupted(code, tmp_path, after=0.5)
+
+
+def test_times_of_a_playback_that_another_thread_plays(tmp_path):
+    """Reading them waits for nothing. ``seek`` needs the simulation, and Ctrl+C ends its wait."""
+    code = (
+        # A read that waits ends the process, which the test sees as a missing line.
+        "import os, signal, threading, time\nimport kinetoscope as ks\nsignal.alarm(30)\n" + PREPARED["play"] + "playback = ks.Playback('short.npz', sim)\n"
+        "before = list(playback.times), [playback.frame_at(time) for time in (-1.0, 0.1, 99.0)]\n"
+        "thread = threading.Thread(target=playback.play, daemon=True)\nthread.start()\ntime.sleep(0.5)\n"
+        "started = time.perf_counter()\n"
+        "for _ in range(100):\n"
+        "    after = list(playback.times), [playback.frame_at(time) for time in (-1.0, 0.1, 99.0)]\n"
+        "    assert after == before and len(playback) == len(before[0]) == 501 and '501' in repr(playback)\n"
+        "assert before[1] == [0, 10, 500] and thread.is_alive() and playback.joints_without_data == []\n"
+        "assert time.perf_counter() - started < 0.5\n"
+        "print('ready', flush=True)\n"
+        "try:\n    playback.seek(3)\nexcept KeyboardInterrupt:\n"
+        "    print('interrupted', time.time(), thread.is_alive(), flush=True)\nos._exit(0)\n"
     )
     assert_interrupted(code, tmp_path, after=0.5)
 

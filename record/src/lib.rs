@@ -81,7 +81,7 @@ pub use kinetoscope_http::ServeError;
 pub use live::{FoxgloveCfg, FoxgloveServer, StreamToFoxglove};
 pub use overview::OverviewCfg;
 pub use packet::{Event, EventKind};
-pub use playback::Playback;
+pub use playback::{Playback, frame_at};
 pub use read::{FieldSelector, RecordedTopic, Recording, TimeSeries};
 pub use recorder::{Record, Recorder, RecorderId, RecordingSummary};
 pub use recover::{Recovered, recover, recover_to};

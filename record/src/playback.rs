@@ -6,6 +6,12 @@ use crate::scene_file::{self, SCENE_ARCHIVE};
 use kinetoscope_sim::{MjcfId, MjcfPart, SimulationManager};
 use ndarray::Array2;
 
+/// Index of the last of `times` \[s\], in ascending order, at or before `time` \[s\], with a tolerance of 1 ns; 0 before the
+/// first. For a copy of [`Playback::times`].
+pub fn frame_at(times: &[f64], time: f64) -> usize {
+    times.partition_point(|frame| *frame <= time + 1e-9).saturating_sub(1)
+}
+
 /// Recorded motion in its scene. [`seek`](Self::seek) sets the positions of a simulation to a recorded time, by its
 /// index in [`times`](Self::times).
 ///
@@ -133,7 +139,7 @@ impl Playback {
 
     /// Index of the last recorded time at or before `time` \[s\], with a tolerance of 1 ns; 0 before the first.
     pub fn frame_at(&self, time: f64) -> usize {
-        self.times.partition_point(|frame| *frame <= time + 1e-9).saturating_sub(1)
+        frame_at(&self.times, time)
     }
 
     /// Sets the simulation to the time with index `frame` in [`times`](Self::times); a larger index is the last one.

@@ -16,6 +16,7 @@
 //! | [`kinematics`] | chains, Jacobians, inverse kinematics |
 //! | [`dynamics`] | inverse dynamics and mass matrices |
 //! | [`inertia`], [`body_inertia`], [`shape_inertia`] | mass properties of links, of rigid bodies, and of shapes |
+//! | [`position_range`] | position limits of joints, with those of mimic joints |
 //! | [`mesh_key`] | keys of mesh files in caches |
 //! | [`diagnostic`] | warnings about input that is odd but usable |
 //!
@@ -47,5 +48,6 @@ pub mod dynamics;
 pub mod inertia;
 pub mod kinematics;
 pub mod mesh_key;
+pub mod position_range;
 pub mod shape_inertia;
 pub mod urdf;

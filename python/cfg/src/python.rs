@@ -1,7 +1,9 @@
 //! Texts of the Python modules.
 
-use crate::source::{Content, Field, Variant, find_enum, find_struct, parse};
-use crate::types::{AREAS, DECLARED_ENUMS, Declared, ENUMS, Struct, area, python_name, structs, variant_defaults};
+use crate::source::{Content, Field, Variant, find_enum, find_method, find_struct, parse, snake_case};
+use crate::types::{
+    AREAS, DECLARED_ENUMS, Declared, ENUMS, FROM, METHODS, Struct, area, python_name, structs, variant_defaults,
+};
 use crate::words::{in_python, wrapped};
 use std::cell::RefCell;
 use std::collections::{BTreeMap, BTreeSet};
@@ -108,7 +110,14 @@ fn standard_imports(text: &str) -> String {
             let _ = writeln!(imports, "from {module} import {}", names.join(", "));
         }
     }
+    let arrays: Vec<&str> = ["ArrayLike", "NDArray"].into_iter().filter(|name| has_word(text, name)).collect();
+    if !arrays.is_empty() {
+        let _ = write!(imports, "\nfrom numpy.typing import {}\n", arrays.join(", "));
+    }
     imports.push('\n');
+    if text.contains(" _sim._") {
+        imports.push_str("from .. import _sim\n");
+    }
     imports
 }
 
@@ -178,6 +187,7 @@ impl Context {
                 }
             }
             text.push_str(&self.enumeration(known.name, &doc, &variants));
+            text.push_str(&self.methods(root, known.file, known.name, true)?);
             names.insert(python_name(known.name).to_string());
         }
         for known in DECLARED_ENUMS.iter().filter(|known| known.area == module) {
@@ -192,9 +202,42 @@ impl Context {
             let doc = self.doc(&doc).map_err(|error| located(known.class, error))?;
             self.translate(&mut fields).map_err(|error| located(known.class, error))?;
             text.push_str(&self.class(known, &doc, &fields));
+            text.push_str(&self.methods(root, known.file, known.name, false)?);
             names.insert(known.class.to_string());
         }
         Ok((text, names))
+    }
+
+    /// Methods of a type that the extension module computes.
+    fn methods(&self, root: &Path, file: &str, owner: &str, is_static: bool) -> Result<String, String> {
+        let mut text = String::new();
+        for method in METHODS.iter().filter(|method| method.owner == owner) {
+            let doc = find_method(&parse(root, file)?, owner, method.name)
+                .ok_or_else(|| format!("{file}: {owner} has no method {}", method.name))?;
+            let doc = self.doc(&doc).map_err(|error| format!("{owner}.{}: {error}", method.name))?;
+            let (mut arguments, mut given) = (Vec::new(), Vec::new());
+            if !method.name.starts_with(FROM) {
+                let own = if is_static { snake_case(owner) } else { "self".into() };
+                let kind = if is_static { ": Mapping[str, Any]" } else { "" };
+                arguments.push(format!("{own}{kind}"));
+                given.push(own);
+            }
+            arguments.extend(method.arguments.iter().map(|(name, kind)| format!("{name}: {kind}")));
+            given.extend(method.arguments.iter().map(|(name, _)| (*name).to_string()));
+            let _ = write!(
+                text,
+                "\n{}    def {}({}) -> {}:\n{}        return _sim._{}_{}({})\n",
+                if is_static { "    @staticmethod\n" } else { "" },
+                method.name,
+                arguments.join(", "),
+                method.result,
+                docstring(&doc, 8),
+                snake_case(owner),
+                method.name,
+                given.join(", ")
+            );
+        }
+        Ok(text)
     }
 
     fn translate(&self, fields: &mut [Field]) -> Result<(), String> {

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 use syn::parse::{ParseStream, Parser as _};
-use syn::{Attribute, Expr, Fields, File, Ident, Item, ItemMacro, Lit, LitStr, Meta, Token, Type};
+use syn::{Attribute, Expr, Fields, File, Ident, ImplItem, Item, ItemMacro, Lit, LitStr, Meta, Token, Type};
 
 /// A field of a struct or of a variant.
 #[derive(Debug)]
@@ -137,6 +137,19 @@ pub(crate) fn find_enum(file: &File, name: &str) -> Option<(String, Vec<Variant>
     })
 }
 
+/// Documentation of a method of a type, without its errors.
+pub(crate) fn find_method(file: &File, owner: &str, name: &str) -> Option<String> {
+    let methods = file.items.iter().filter_map(|item| match item {
+        Item::Impl(item) if item.trait_.is_none() && is_named(&item.self_ty, owner) => Some(&item.items),
+        _ => None,
+    });
+    let found = methods.flatten().find_map(|item| match item {
+        ImplItem::Fn(method) if method.sig.ident == name => Some(doc(&method.attrs)),
+        _ => None,
+    })?;
+    found.split("\n\n# Errors").next().map(String::from)
+}
+
 fn fields(fields: &Fields, default: bool) -> Vec<Field> {
     let field = |field: &syn::Field| {
         let name = field.ident.as_ref()?.to_string();
@@ -152,7 +165,11 @@ fn fields(fields: &Fields, default: bool) -> Vec<Field> {
 }
 
 fn is_option(ty: &Type) -> bool {
-    matches!(ty, Type::Path(path) if path.path.segments.last().is_some_and(|segment| segment.ident == "Option"))
+    is_named(ty, "Option")
+}
+
+fn is_named(ty: &Type, name: &str) -> bool {
+    matches!(ty, Type::Path(path) if path.path.segments.last().is_some_and(|segment| segment.ident == name))
 }
 
 /// Arguments of `#[serde(...)]` without spaces: `default`, `rename="x"`.

@@ -58,6 +58,42 @@ pub(crate) enum Declared {
     Class(&'static str),
 }
 
+/// A method of a configuration that the extension module computes, by its function `_class_method`.
+#[derive(Debug)]
+pub(crate) struct Method {
+    /// Name of the type in Rust, which is that in Python, too.
+    pub(crate) owner: &'static str,
+    pub(crate) name: &'static str,
+    /// Arguments with their types, without the configuration.
+    pub(crate) arguments: &'static [(&'static str, &'static str)],
+    pub(crate) result: &'static str,
+}
+
+/// All methods of configurations. Those of an enumeration are static; [`FROM`] makes one from other values.
+pub(crate) const METHODS: &[Method] = &[
+    method("TerrainGrid", "heights", &[], "NDArray[Any]"),
+    method("TerrainGrid", "size", &[], "tuple[float, float]"),
+    method("TerrainGrid", "tile_center", &[("row", "int"), ("column", "int")], "tuple[float, float]"),
+    method("TerrainGrid", "tile_at", &[("x", "float"), ("y", "float")], "tuple[int, int] | None"),
+    method("TerrainGrid", "row_difficulty", &[("row", "int")], "float"),
+    method("TerrainGrid", "platform_heights", &[], "NDArray[Any]"),
+    method("SimulationManagerCfg", "env_origins", &[], "NDArray[Any]"),
+    method("Intrinsics", "from_matrix", &[("matrix", "ArrayLike")], "dict[str, Any]"),
+    method("Intrinsics", "matrix", &[("width", "int"), ("height", "int")], "NDArray[Any]"),
+];
+
+/// Beginning of the names of static methods that do not take a configuration.
+pub(crate) const FROM: &str = "from_";
+
+const fn method(
+    owner: &'static str,
+    name: &'static str,
+    arguments: &'static [(&'static str, &'static str)],
+    result: &'static str,
+) -> Method {
+    Method { owner, name, arguments, result }
+}
+
 /// The modules of the package `cfg`, and the items of each in words. A module uses those before it.
 pub(crate) const AREAS: [(&str, &str); 14] = [
     ("shapes", "shapes, surfaces and collision geometry"),

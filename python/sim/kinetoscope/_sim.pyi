@@ -1,6 +1,6 @@
 """Types of the extension module. A test compares them with the module, and the documentation with that of the module
 (``python/tests/stub_docs.py`` writes it). The classes of entities are in ``_sim_entities.pyi``,
-those of views in ``_sim_views.pyi``."""
+those of views in ``_sim_views.pyi``, and that of kinematic chains in ``_sim_kinematics.pyi``."""
 
 import os
 from collections.abc import Iterator, Mapping, Sequence
@@ -26,6 +26,7 @@ from ._sim_entities import (
     _Fields,
     _Numbers,
 )
+from ._sim_kinematics import KinematicChain, _UrdfFiles
 from ._sim_views import FileRecording, ImageWindow, Server, Viewer, Window
 from .cfg import (
     ActuatorStateCfg,
@@ -59,6 +60,7 @@ from .cfg import (
     StereoCameraCfg,
     TaskCfg,
     TerrainCfg,
+    TerrainGrid,
     WeldCfg,
     WindowCfg,
 )
@@ -97,6 +99,7 @@ __all__ = [
     "FoxgloveServer",
     "IkResult",
     "ImageWindow",
+    "KinematicChain",
     "MjcfPart",
     "Playback",
     "Recorder",
@@ -120,8 +123,18 @@ __all__ = [
     "__version__",
     "_default_fields",
     "_default_uid",
+    "_intrinsics_from_matrix",
+    "_intrinsics_matrix",
     "_panic_next",
     "_set_assets",
+    "_simulation_manager_cfg_env_origins",
+    "_terrain_grid_heights",
+    "_terrain_grid_platform_heights",
+    "_terrain_grid_row_difficulty",
+    "_terrain_grid_size",
+    "_terrain_grid_tile_at",
+    "_terrain_grid_tile_center",
+    "assemble_urdf",
     "asset_path",
     "bundled_robot",
     "inspect",
@@ -137,6 +150,11 @@ __all__ = [
 __version__: str
 _NONE_IS_FALSE: list[str]
 
+def assemble_urdf(robot: _UrdfFiles) -> str:
+    """Merges the URDF files of a robot into one, and returns its text. ``robot`` is a ``UrdfCfg``, a ``RobotCfg``
+    with URDF files, a dict of the fields of one of them, or the path of a file. Paths of meshes and textures are
+    absolute. Masses and inertias are those of the files. ``inspect`` lists warnings about the files.
+    """
 def asset_path(asset: str | os.PathLike[str]) -> Path:
     """Path of a bundled asset such as ``sr5/SR5.urdf``, searched in the folder ``KINETOSCOPE_ASSETS``, then in the
     package.
@@ -179,6 +197,15 @@ def recording_topics(path: str | os.PathLike[str]) -> list[tuple[str, list[str]]
     """Names of the topics of a recording, each with the names of its numbers."""
 def _default_fields(name: str) -> str: ...
 def _default_uid(kind: str) -> str: ...
+def _intrinsics_from_matrix(matrix: ArrayLike) -> dict[str, Any]: ...
+def _intrinsics_matrix(intrinsics: Mapping[str, Any], width: int, height: int) -> _Array: ...
+def _simulation_manager_cfg_env_origins(cfg: SimulationManagerCfg) -> _Array: ...
+def _terrain_grid_heights(cfg: TerrainGrid) -> _Array: ...
+def _terrain_grid_platform_heights(cfg: TerrainGrid) -> _Array: ...
+def _terrain_grid_row_difficulty(cfg: TerrainGrid, row: int) -> float: ...
+def _terrain_grid_size(cfg: TerrainGrid) -> tuple[float, float]: ...
+def _terrain_grid_tile_at(cfg: TerrainGrid, x: float, y: float) -> tuple[int, int] | None: ...
+def _terrain_grid_tile_center(cfg: TerrainGrid, row: int, column: int) -> tuple[float, float]: ...
 def _set_assets(folder: str | os.PathLike[str]) -> bool: ...
 def _panic_next(requested: bool) -> bool: ...
 

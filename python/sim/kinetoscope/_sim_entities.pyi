@@ -23,26 +23,28 @@ _Out = TypeVar("_Out", bound=_Array)
 
 @final
 class IkResult:
-    """Result of ``Robot.compute_ik``, one entry for each environment."""
+    """Result of inverse kinematics: one entry for each environment of ``Robot.compute_ik``, or for each target of
+    ``KinematicChain.compute_ik``.
+    """
 
     @property
     def iterations(self) -> _Array:
-        """Solver iterations, shape (num_envs,)."""
+        """Solver iterations, shape (N,)."""
     @property
     def position_error(self) -> _Array:
-        """Distance to the target [m], shape (num_envs,)."""
+        """Distance to the target [m], shape (N,)."""
     @property
     def qpos(self) -> _Array:
-        """Joint positions [rad or m], shape (num_envs, joints); the best ones found where ``success`` is false."""
+        """Joint positions [rad or m], shape (N, joints); the best ones found where ``success`` is false."""
     @property
     def rotation_error(self) -> _Array:
-        """Angle to the target [rad], shape (num_envs,)."""
+        """Angle to the target [rad], shape (N,)."""
     @property
     def seed(self) -> _Array:
-        """Index of the start that led to the result, shape (num_envs,); 0 is the start from the initial positions."""
+        """Index of the start that led to the result, shape (N,); 0 is the start from the initial positions."""
     @property
     def success(self) -> _Array:
-        """True where the target is reached, shape (num_envs,)."""
+        """True where the target is reached, shape (N,)."""
     def __repr__(self) -> str: ...
 
 @final

@@ -2,7 +2,10 @@
 
 use kinetoscope::assets::AssetNotFound;
 use kinetoscope::record::RecordError;
+use kinetoscope::render::OpticsError;
 use kinetoscope::robot::dynamics::DynamicsError;
+use kinetoscope::robot::kinematics::KinematicsError;
+use kinetoscope::scene::terrain::TerrainError;
 use kinetoscope::sensors::SensorError;
 use kinetoscope::sim::inspect::InspectError;
 use kinetoscope::sim::{DeviceError, Error};
@@ -198,6 +201,9 @@ classes! {
     serde_json::Error => Internal,
     InspectError => Model,
     DynamicsError => Argument,
+    KinematicsError => Argument,
+    OpticsError => Argument,
+    TerrainError => Config,
     DeviceError => Device,
 }
 

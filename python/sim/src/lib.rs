@@ -8,12 +8,14 @@
 mod arguments;
 mod calibration;
 mod cfg;
+mod cfg_methods;
 mod channels;
 mod device;
 mod dynamics;
 mod errors;
 mod file_recording;
 mod html;
+mod kinematics;
 mod objects;
 mod progress;
 mod recording;
@@ -160,6 +162,7 @@ fn _sim(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<simulation::Simulation>()?;
     module.add_class::<robot::Robot>()?;
     module.add_class::<robot::IkResult>()?;
+    module.add_class::<kinematics::KinematicChain>()?;
     module.add_class::<objects::RigidObject>()?;
     module.add_class::<objects::RigidObjectGroup>()?;
     module.add_class::<objects::Terrain>()?;
@@ -182,6 +185,7 @@ fn _sim(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<viewer_control::Viewer>()?;
     module.add_function(wrap_pyfunction!(asset_path, module)?)?;
     module.add_function(wrap_pyfunction!(bundled_robot, module)?)?;
+    module.add_function(wrap_pyfunction!(kinematics::assemble_urdf, module)?)?;
     module.add_function(wrap_pyfunction!(inspect, module)?)?;
     module.add_function(wrap_pyfunction!(json_schema, module)?)?;
     module.add_function(wrap_pyfunction!(calibration::read_calibration, module)?)?;
@@ -190,6 +194,7 @@ fn _sim(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(simulation::to_toml, module)?)?;
     module.add_function(wrap_pyfunction!(recording::read_series, module)?)?;
     module.add_function(wrap_pyfunction!(recording::recording_topics, module)?)?;
+    cfg_methods::add(module)?;
     module.add_function(wrap_pyfunction!(_set_assets, module)?)?;
     module.add_function(wrap_pyfunction!(_default_uid, module)?)?;
     module.add_function(wrap_pyfunction!(_default_fields, module)?)?;

@@ -436,6 +436,9 @@ fn format_of(name: &str) -> PyResult<Format> {
 pub(crate) struct Playback {
     shared: Arc<Shared>,
     sim: Py<Simulation>,
+    /// Times of the frames [s], which do not change: reading them needs no lock, which a thread that plays holds.
+    times: Vec<f64>,
+    joints_without_data: Vec<String>,
     inner: Mutex<record::Playback>,
 }
 
@@ -461,7 +464,8 @@ impl Playback {
         let shared = Shared::new(manager);
         parts.into_iter().for_each(|(uid, id)| shared.register(&uid, Entity::Mjcf(id)));
         let sim = Py::new(py, Simulation { shared: Arc::clone(&shared) })?;
-        Ok(Self { shared, sim, inner: Mutex::new(inner) })
+        let (times, joints_without_data) = (inner.times().to_vec(), inner.joints_without_data().to_vec());
+        Ok(Self { shared, sim, times, joints_without_data, inner: Mutex::new(inner) })
     }
 
     /// Simulation that shows the recording: the recorded scene as MJCF parts.
@@ -472,37 +476,32 @@ impl Playback {
 
     /// Times of the frames [s], shape (frames,).
     #[getter]
-    fn times<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
-        Ok(detached(py, || Ok(self.lock().times().to_vec()))?.into_pyarray(py))
+    fn times<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        PyArray1::from_slice(py, &self.times)
     }
 
     /// Names of the joints that the recording has no positions of; they stay where they were.
     #[getter]
-    fn joints_without_data(&self, py: Python<'_>) -> PyResult<Vec<String>> {
-        detached(py, || Ok(self.lock().joints_without_data().to_vec()))
+    fn joints_without_data(&self) -> Vec<String> {
+        self.joints_without_data.clone()
     }
 
     /// Shows a frame, by its index in ``times``.
     fn seek(&self, py: Python<'_>, frame: usize) -> PyResult<()> {
-        self.shared.write(py, |sim| {
-            let mut playback = self.lock();
-            let count = playback.times().len();
-            if frame >= count {
-                return Err(Failure::new(
-                    Class::OutOfRange,
-                    format!("frame {frame} does not exist; there are {count}"),
-                ));
-            }
-            Ok(playback.seek(sim, frame)?)
-        })
+        let count = self.times.len();
+        if frame >= count {
+            let message = format!("frame {frame} does not exist; there are {count}");
+            return Err(Failure::new(Class::OutOfRange, message).into());
+        }
+        self.shared.write(py, |sim| Ok(self.lock().seek(sim, frame)?))
     }
 
     /// Index of the last frame at or before a time [s]; 0 before the first.
-    fn frame_at(&self, py: Python<'_>, time: f64) -> PyResult<usize> {
+    fn frame_at(&self, time: f64) -> PyResult<usize> {
         if time.is_nan() {
             return Err(Failure::argument("time", "nan is not a time in seconds").into());
         }
-        detached(py, || Ok(self.lock().frame_at(time)))
+        Ok(guarded(|| Ok(record::frame_at(&self.times, time)))?)
     }
 
     /// Shows the recording in the windows and browser views of ``sim``, from the first frame in real time. Viewers pause it, seek,
@@ -530,17 +529,18 @@ impl Playback {
         })
     }
 
-    fn __len__(&self, py: Python<'_>) -> PyResult<usize> {
-        detached(py, || Ok(self.lock().times().len()))
+    fn __len__(&self) -> usize {
+        self.times.len()
     }
 
-    fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
-        Ok(format!("<Playback of {} frames>", self.__len__(py)?))
+    fn __repr__(&self) -> String {
+        format!("<Playback of {} frames>", self.times.len())
     }
 }
 
 impl Playback {
-    /// The playback. Its lock is held while a frame is shown, so callers do not hold the interpreter.
+    /// The playback. Its lock is held while a frame is shown. Only callers that hold the simulation wait for it, so no other
+    /// thread plays then.
     fn lock(&self) -> MutexGuard<'_, record::Playback> {
         self.inner.lock().unwrap_or_else(PoisonError::into_inner)
     }

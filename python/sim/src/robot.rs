@@ -9,7 +9,7 @@ use kinetoscope::robot::description::{Joint, Link, LinkId};
 use kinetoscope::robot::kinematics::{IkCfg, TipFrame};
 use kinetoscope::scene::Pose;
 use kinetoscope::scene::pose::from_row;
-use kinetoscope::sim::{DriveType, JointIndex, RobotId, WrenchFrame};
+use kinetoscope::sim::{self, DriveType, JointIndex, RobotId, WrenchFrame};
 use numpy::IntoPyArray;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -553,14 +553,7 @@ impl Robot {
             let initial = initial.as_ref().map(|rows| rows.view());
             Ok(sim.robot(self.id).compute_ik(&targets, tip, &settings, initial, env_ids.as_deref())?)
         })?;
-        Ok(IkResult {
-            qpos: found.qpos.into_pyarray(py).into_any().unbind(),
-            success: found.success.into_pyarray(py).into_any().unbind(),
-            position_error: found.position_error.into_pyarray(py).into_any().unbind(),
-            rotation_error: found.rotation_error.into_pyarray(py).into_any().unbind(),
-            iterations: found.iterations.into_pyarray(py).into_any().unbind(),
-            seed: found.seed.into_pyarray(py).into_any().unbind(),
-        })
+        Ok(IkResult::new(py, found))
     }
 
     fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
@@ -584,22 +577,37 @@ impl Robot {
 
 equal_handles! { Robot: id }
 
-/// Result of ``Robot.compute_ik``, one entry for each environment.
+/// Result of inverse kinematics: one entry for each environment of ``Robot.compute_ik``, or for each target of
+/// ``KinematicChain.compute_ik``.
 #[pyclass(frozen, get_all, module = "kinetoscope")]
 #[derive(Debug)]
 pub(crate) struct IkResult {
-    /// Joint positions [rad or m], shape (num_envs, joints); the best ones found where ``success`` is false.
+    /// Joint positions [rad or m], shape (N, joints); the best ones found where ``success`` is false.
     qpos: Py<PyAny>,
-    /// True where the target is reached, shape (num_envs,).
+    /// True where the target is reached, shape (N,).
     success: Py<PyAny>,
-    /// Distance to the target [m], shape (num_envs,).
+    /// Distance to the target [m], shape (N,).
     position_error: Py<PyAny>,
-    /// Angle to the target [rad], shape (num_envs,).
+    /// Angle to the target [rad], shape (N,).
     rotation_error: Py<PyAny>,
-    /// Solver iterations, shape (num_envs,).
+    /// Solver iterations, shape (N,).
     iterations: Py<PyAny>,
-    /// Index of the start that led to the result, shape (num_envs,); 0 is the start from the initial positions.
+    /// Index of the start that led to the result, shape (N,); 0 is the start from the initial positions.
     seed: Py<PyAny>,
+}
+
+impl IkResult {
+    /// Hands the arrays of a result over to NumPy.
+    pub(crate) fn new(py: Python<'_>, found: sim::IkResult) -> Self {
+        Self {
+            qpos: found.qpos.into_pyarray(py).into_any().unbind(),
+            success: found.success.into_pyarray(py).into_any().unbind(),
+            position_error: found.position_error.into_pyarray(py).into_any().unbind(),
+            rotation_error: found.rotation_error.into_pyarray(py).into_any().unbind(),
+            iterations: found.iterations.into_pyarray(py).into_any().unbind(),
+            seed: found.seed.into_pyarray(py).into_any().unbind(),
+        }
+    }
 }
 
 #[pymethods]

@@ -653,7 +653,7 @@ fn add(sim: &mut SimulationManager, name: &str, cfg: EntityCfg) -> Result<Entity
 }
 
 /// Diagnostics as values of Python.
-fn diagnostics<'py>(py: Python<'py>, diagnostics: &[Diagnostic]) -> PyResult<Vec<Bound<'py, PyAny>>> {
+pub(crate) fn diagnostics<'py>(py: Python<'py>, diagnostics: &[Diagnostic]) -> PyResult<Vec<Bound<'py, PyAny>>> {
     let class = py.import("kinetoscope.diagnostics")?.getattr("Diagnostic")?;
     let value = |diagnostic: &Diagnostic| {
         let source = diagnostic.source.as_ref();

@@ -84,13 +84,43 @@ impl Chain {
     /// # Errors
     /// The link does not exist, or it is not connected to the root.
     pub fn new(description: &RobotDescription, link: LinkId, link_from_frame: &Pose) -> Result<Self, KinematicsError> {
+        Self::build(description, None, link, link_from_frame)
+    }
+
+    /// Builds the chain from the link `base` to a frame at `link_from_frame` on `link`. Variables are those of
+    /// [`new`](Self::new).
+    ///
+    /// # Errors
+    /// Same errors as [`new`](Self::new). `base` is neither `link` nor above it, or a floating or planar joint lies
+    /// between them.
+    pub fn between(
+        description: &RobotDescription,
+        base: LinkId,
+        link: LinkId,
+        link_from_frame: &Pose,
+    ) -> Result<Self, KinematicsError> {
+        let count = description.links.len();
+        if base.0 >= count {
+            return Err(KinematicsError::NoSuchLink { index: base.0, count });
+        }
+        Self::build(description, Some(base), link, link_from_frame)
+    }
+
+    fn build(
+        description: &RobotDescription,
+        wanted_base: Option<LinkId>,
+        link: LinkId,
+        link_from_frame: &Pose,
+    ) -> Result<Self, KinematicsError> {
         let count = description.links.len();
         if link.0 >= count {
             return Err(KinematicsError::NoSuchLink { index: link.0, count });
         }
         let not_a_tree = || KinematicsError::NotATree { link: description.links[link.0].name.clone() };
         let (mut base, mut path) = (link, Vec::new());
-        while let Some(id) = description.link(base).parent_joint {
+        while wanted_base != Some(base)
+            && let Some(id) = description.link(base).parent_joint
+        {
             let joint = description.joints.get(id.0).ok_or_else(not_a_tree)?;
             if matches!(joint.kind, JointKind::Floating | JointKind::Planar) {
                 break;
@@ -100,6 +130,14 @@ impl Chain {
             }
             path.push(id);
             base = joint.parent;
+        }
+        if let Some(wanted) = wanted_base.filter(|&wanted| wanted != base) {
+            let name = |link: LinkId| description.link(link).name.clone();
+            return Err(KinematicsError::BaseNotAbove {
+                base: name(wanted),
+                link: name(link),
+                above: path.iter().map(|&id| name(description.joint(id).parent)).collect(),
+            });
         }
         let follows = mimic_relations(description);
         let (mut joints, mut parent_from_joint) = (Vec::new(), Pose::identity());

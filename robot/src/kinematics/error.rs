@@ -18,6 +18,16 @@ pub enum KinematicsError {
         /// Name of the link.
         link: String,
     },
+    /// The base of a chain is not above its last link, or a floating or planar joint lies between them.
+    #[error("link {base:?} is no base of a chain to link {link:?}; {}", bases_sentence(.above))]
+    BaseNotAbove {
+        /// Name of the base given.
+        base: String,
+        /// Name of the last link.
+        link: String,
+        /// Links above the last link that can be the base, the nearest first.
+        above: Vec<String>,
+    },
     /// A control part ends in several links, so its last link is ambiguous.
     #[error("control part {part:?} has several end links: {}; select one with TipFrame", quoted(.links))]
     AmbiguousTip {
@@ -78,6 +88,17 @@ pub enum KinematicsError {
 
 fn quoted(names: &[String]) -> String {
     names.iter().map(|name| format!("{name:?}")).collect::<Vec<_>>().join(", ")
+}
+
+/// Largest number of links in the message of a wrong base.
+const MAX_BASES: usize = 12;
+
+fn bases_sentence(above: &[String]) -> String {
+    match above.len() {
+        0 => "no other link is above it".into(),
+        count if count > MAX_BASES => format!("nearest of {count} links above it: {}", quoted(&above[..MAX_BASES])),
+        _ => format!("links above it: {}", quoted(above)),
+    }
 }
 
 fn movers_sentence(movers: &[String]) -> String {

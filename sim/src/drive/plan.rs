@@ -6,9 +6,10 @@ use super::gains::{DriveSetting, Gains};
 use super::models::ActuatorModel;
 use super::{DriveType, JointInfo, PdGains};
 use crate::pattern::{self, PatternError};
-use kinetoscope_robot::description::{CouplingPolynomial, FileActuation, Joint, JointId, JointKind, RobotDescription};
+use kinetoscope_robot::description::{CouplingPolynomial, FileActuation, Joint, JointId, RobotDescription};
 use kinetoscope_robot::diagnostic::{Diagnostic, DiagnosticKind};
 use kinetoscope_robot::dynamics::{Configuration, Dynamics, DynamicsError};
+use kinetoscope_robot::position_range::{PositionRange, position_ranges};
 use nalgebra::DMatrix;
 use std::collections::BTreeMap;
 
@@ -101,13 +102,14 @@ pub fn plan(
     let initial = pattern::assign(init_qpos, parts, &names, "joint").map_err(PlanError::InitialPattern)?;
 
     let mut diagnostics = Vec::new();
+    let ranges = position_ranges(description, &mut diagnostics);
     let mut plans: Vec<JointPlan> = joints
         .iter()
         .zip(&gains)
-        .map(|(&(id, joint), gains)| {
+        .zip(ranges)
+        .map(|((&(id, joint), gains), PositionRange { limit, target_range })| {
             let effort = joint.limit.as_ref().and_then(|l| l.effort).filter(|&e| e > 0.0);
             let velocity = joint.limit.as_ref().and_then(|l| l.velocity).filter(|&v| v > 0.0);
-            let limit = own_limit(joint);
             JointPlan {
                 joint: id,
                 actuator: None,
@@ -119,13 +121,12 @@ pub fn plan(
                 armature: gains.armature.or(joint.defaults.map(|file| file.armature)).unwrap_or(0.0),
                 damping: joint.damping.unwrap_or(0.0),
                 limit,
-                target_range: limit.unwrap_or([f64::NEG_INFINITY, f64::INFINITY]),
+                target_range,
                 mimic: joint.mimic.as_ref().map(|_| description.mimic_driver(id)),
                 initial: 0.0,
             }
         })
         .collect();
-    narrow_by_mimics(description, &mut plans, &mut diagnostics);
     set_initial_positions(description, &mut plans, &initial, &mut diagnostics)?;
 
     if drive.drive_type.mode().needs_inertia() {
@@ -179,64 +180,8 @@ fn drive_setting(joint: &Joint, drive_type: DriveType, gains: &JointGains) -> Dr
     }
 }
 
-/// Position limits of a joint \[rad or m\]; `None` for an unlimited joint. A continuous joint is unlimited, even if the
-/// file gives limits. A single missing end is 0, the default of URDF. With both ends missing (or rejected with a
-/// warning), the joint is unlimited.
-pub(crate) fn own_limit(joint: &Joint) -> Option<[f64; 2]> {
-    let limit = joint.limit.as_ref().filter(|_| joint.kind != JointKind::Continuous)?;
-    (limit.lower.is_some() || limit.upper.is_some()).then(|| [limit.lower.unwrap_or(0.0), limit.upper.unwrap_or(0.0)])
-}
-
 /// Tolerance for limits that are written with few digits \[rad or m\].
 const LIMIT_TOLERANCE: f64 = 1e-6;
-
-/// Fraction of its own range that a driver keeps at least; limits of a follower that would leave less are ignored.
-const MIN_RANGE_FRACTION: f64 = 0.01;
-
-/// Narrows the range of every driver to positions that its followers can reach. A follower that leaves at most
-/// [`MIN_RANGE_FRACTION`] of the driver's own range is released: its limits become those of the driver's range.
-fn narrow_by_mimics(description: &RobotDescription, plans: &mut [JointPlan], diagnostics: &mut Vec<Diagnostic>) {
-    let mut released = Vec::new();
-    for i in 0..plans.len() {
-        let (Some((driver, multiplier, offset)), Some(limit)) = (plans[i].mimic, plans[i].limit) else { continue };
-        if multiplier == 0.0 {
-            continue;
-        }
-        let Some(d) = plans.iter().position(|p| p.joint == driver) else { continue };
-        let ends = limit.map(|end| (end - offset) / multiplier);
-        let (low, high) = (ends[0].min(ends[1]), ends[0].max(ends[1]));
-        let [old_low, old_high] = plans[d].target_range;
-        if low <= old_low + LIMIT_TOLERANCE && high >= old_high - LIMIT_TOLERANCE {
-            continue;
-        }
-        let (joint, driver_joint) = (description.joint(plans[i].joint), description.joint(driver));
-        // Positive zeros: a range from -0 would look like a mistake.
-        let narrowed = [old_low.max(low) + 0.0, old_high.min(high) + 0.0];
-        let own_extent = plans[d].limit.map_or(0.0, |[low, high]| high - low);
-        let outcome = if narrowed[1] - narrowed[0] > (MIN_RANGE_FRACTION * own_extent).max(LIMIT_TOLERANCE) {
-            plans[d].target_range = narrowed;
-            format!("the usable range of {:?} is {:.4} .. {:.4}", driver_joint.name, narrowed[0], narrowed[1])
-        } else {
-            released.push((i, d));
-            format!("these limits leave no range for {:?} and were ignored", driver_joint.name)
-        };
-        diagnostics.push(Diagnostic::new(
-            DiagnosticKind::MimicRangeClipped,
-            joint.limit.as_ref().map(|l| l.source.clone()),
-            format!(
-                "joint {:?} mimics {:?} with multiplier {multiplier} beyond its own limits {} .. {}: {outcome}",
-                joint.name, driver_joint.name, limit[0], limit[1]
-            ),
-        ));
-    }
-    for (i, d) in released {
-        let Some((_, multiplier, offset)) = plans[i].mimic else { continue };
-        let ends = plans[d].target_range.map(|end| multiplier * end + offset);
-        let limit = [ends[0].min(ends[1]), ends[0].max(ends[1])];
-        plans[i].limit = Some(limit).filter(|limit| limit.iter().all(|end| end.is_finite()));
-        plans[i].target_range = plans[i].limit.unwrap_or([f64::NEG_INFINITY, f64::INFINITY]);
-    }
-}
 
 fn set_initial_positions(
     description: &RobotDescription,

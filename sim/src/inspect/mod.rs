@@ -1,4 +1,5 @@
-//! Report on a robot without a simulation: tree, mass properties, dynamics at a position, and warnings.
+//! Description of a robot without a simulation ([`describe`]), and a report on it ([`inspect`]): tree, mass properties,
+//! dynamics at a position, and warnings.
 //!
 //! [`inspect`] reads the files as [`SimulationManager::add_robot`](crate::SimulationManager::add_robot) does, meshes
 //! and convex hulls included. It finds the same warnings except those about start positions. For an MJCF file, warnings
@@ -24,7 +25,7 @@ use kinetoscope_robot::description::{CouplingPolynomial, Geometry, JointId, Join
 use kinetoscope_robot::diagnostic::{Diagnostic, DiagnosticKind};
 use kinetoscope_robot::dynamics::{Configuration, Dynamics, DynamicsError};
 use kinetoscope_robot::shape_inertia::HullSet;
-use kinetoscope_robot::urdf::UrdfCfg;
+use kinetoscope_robot::urdf::{MergedRobot, UrdfCfg, assemble};
 use kinetoscope_scene::mesh::load;
 use kinetoscope_scene::source_location::SourceLocation;
 use nalgebra::Vector3;
@@ -116,6 +117,36 @@ impl From<Error> for InspectError {
     fn from(error: Error) -> Self {
         Self::Load(Box::new(error))
     }
+}
+
+/// Reads the files of a robot without a simulation, and returns its description with the warnings about the files: URDF
+/// files are merged as they are, an MJCF file is compiled by MuJoCo. Mass properties are those of the files, and
+/// payloads are not added. [`Chain`](kinetoscope_robot::kinematics::Chain) takes the description.
+///
+/// ```
+/// use kinetoscope_robot::kinematics::Chain;
+/// use kinetoscope_sim::inspect::describe;
+/// use kinetoscope_sim::{MjcfFile, RobotCfg};
+///
+/// let slide = r#"<mujoco><worldbody><body name="base"><geom size="0.1"/>
+///     <body name="cart" pos="0 0 0.5"><joint name="slide" type="slide" axis="0 0 1"/><geom size="0.1"/></body>
+///   </body></worldbody></mujoco>"#;
+/// let robot = describe(&RobotCfg { mjcf: Some(MjcfFile::text(slide)), ..Default::default() })?.description;
+/// let cart = robot.link_id("cart").ok_or("no cart")?;
+/// let chain = Chain::new(&robot, cart, &kinetoscope_scene::Pose::identity())?;
+/// assert!((chain.pose(&[0.2]).translation.z - 0.7).abs() < 1e-12);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
+/// # Errors
+/// A file or the configuration of the files is invalid.
+pub fn describe(cfg: &RobotCfg) -> Result<MergedRobot, Error> {
+    if cfg.mjcf.is_none() {
+        return Ok(assemble(&cfg.urdf)?);
+    }
+    let mut hulls = HullSet::new(&cfg.hull);
+    let (_, description, diagnostics) = describe_robot(cfg, &(&cfg.uid).into(), 0, None, &mut hulls)?;
+    Ok(MergedRobot { description, diagnostics })
 }
 
 /// Reads the files and creates the report.

@@ -1,11 +1,11 @@
 //! Report as plain data that `serde` writes as JSON. Numbers are SI; quaternions are w, x, y, z; `None` is `null`.
 
 use super::{FREE_COLUMNS, InspectCfg, free_joint_columns};
-use crate::drive::plan::own_limit;
 use kinetoscope_robot::description::{Joint, JointKind, LinkId, RobotDescription};
 use kinetoscope_robot::diagnostic::Diagnostic;
 use kinetoscope_robot::dynamics::Dynamics;
 use kinetoscope_robot::inertia::RigidInertia;
+use kinetoscope_robot::position_range::own_limit;
 use kinetoscope_scene::Pose;
 use kinetoscope_scene::pose::to_row;
 use nalgebra::Vector3;

@@ -1,7 +1,8 @@
 //! A planar arm of two links, with closed forms for everything.
 
 use super::*;
-use kinetoscope::robot::kinematics::{Chain, IkSolver};
+use kinetoscope::robot::description::LinkId;
+use kinetoscope::robot::kinematics::{Chain, IkSolver, KinematicsError};
 use kinetoscope::robot::kinematics::{IkCfg, IkTask, TipFrame};
 use kinetoscope_testkit::urdf::joint;
 
@@ -158,4 +159,32 @@ fn chains() {
     assert_eq!(solver.chain(), &bound);
     let found = solver.solve(&bound.pose(&[0.3, 0.9]), &[0.0, 0.5]).unwrap();
     assert!(found.success && (found.positions[0] - 0.3).abs() < 1e-3 && (found.positions[1] - 0.9).abs() < 1e-3);
+}
+
+/// A chain from a link other than the root: its poses and Jacobians are in the axes of that link, and the joints above it do
+/// not move it.
+#[test]
+fn chains_from_another_base() {
+    let (sim, id) = two_links([-3.2, 3.2]);
+    let robot = sim.robot(id);
+    let (description, tool) = (robot.description(), Pose::translation(L2, 0.0, 0.0));
+    let [root, upper, lower] = ["root", "upper", "lower"].map(|link| robot.link_id(link).unwrap());
+    let chain = Chain::between(description, upper, lower, &tool).unwrap();
+    assert_eq!((chain.base(), [0, 1].map(|variable| chain.is_moved_by(variable))), (upper, [false, true]));
+    let mut columns = [nalgebra::Vector6::zeros(); 2];
+    for elbow in [-1.2, 0.0, 0.7] {
+        let (x, y) = (L1 + L2 * f64::cos(elbow), L2 * f64::sin(elbow));
+        let pose = chain.jacobian(&[0.9, elbow], &mut columns);
+        assert!((pose.translation.vector - nalgebra::Vector3::new(x, y, 0.0)).norm() < 1e-15, "{pose}");
+        assert!((columns[1] - nalgebra::Vector6::new(-y, x - L1, 0.0, 0.0, 0.0, 1.0)).norm() < 1e-15, "{}", columns[1]);
+        assert_eq!(columns[0], nalgebra::Vector6::zeros());
+    }
+    assert_eq!(Chain::between(description, root, lower, &tool), Chain::new(description, lower, &tool));
+    assert_eq!(Chain::between(description, lower, lower, &tool).unwrap().pose(&[]), tool);
+    let error = Chain::between(description, lower, upper, &tool).unwrap_err();
+    let above = vec!["root".to_owned()];
+    assert_eq!(error, KinematicsError::BaseNotAbove { base: "lower".into(), link: "upper".into(), above });
+    assert_eq!(error.to_string(), "link \"lower\" is no base of a chain to link \"upper\"; links above it: \"root\"");
+    let missing = Chain::between(description, LinkId(3), lower, &tool);
+    assert_eq!(missing, Err(KinematicsError::NoSuchLink { index: 3, count: 3 }));
 }

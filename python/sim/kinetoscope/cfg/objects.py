@@ -10,6 +10,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, Literal, TypeAlias
 
+from numpy.typing import NDArray
+
+from .. import _sim
 from .aliases import Pose
 from .shapes import SurfaceCfg
 
@@ -623,6 +626,34 @@ class TerrainGrid:
 
     seed: int = 0
     """Seed of random heights. Equal seeds give the same heights, bit for bit, on every machine."""
+
+    def heights(self) -> NDArray[Any]:
+        """Heights [m] of the whole grid with its border; rows of the array along y, columns along x."""
+        return _sim._terrain_grid_heights(self)
+
+    def size(self) -> tuple[float, float]:
+        """Lengths of the grid along x and y, with its border [m]."""
+        return _sim._terrain_grid_size(self)
+
+    def tile_center(self, row: int, column: int) -> tuple[float, float]:
+        """Center of a tile [m], in the frame of the terrain; rows and columns beyond the grid are continued."""
+        return _sim._terrain_grid_tile_center(self, row, column)
+
+    def tile_at(self, x: float, y: float) -> tuple[int, int] | None:
+        """Row and column of the tile at (x, y) [m] in the frame of the terrain; ``None`` outside the tiles."""
+        return _sim._terrain_grid_tile_at(self, x, y)
+
+    def row_difficulty(self, row: int) -> float:
+        """Difficulty of a row: linear from the first to the second number of ``difficulty`` over the rows; the first
+        for one row.
+        """
+        return _sim._terrain_grid_row_difficulty(self, row)
+
+    def platform_heights(self) -> NDArray[Any]:
+        """Highest point of the platform of each tile [m], shape (rows, columns). The points of a platform include those
+        nearest to the center of the tile, also for a platform smaller than a cell.
+        """
+        return _sim._terrain_grid_platform_heights(self)
 
 
 @dataclass(kw_only=True, slots=True)

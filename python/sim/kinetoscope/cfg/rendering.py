@@ -9,6 +9,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, Literal, TypeAlias
 
+from numpy.typing import ArrayLike, NDArray
+
+from .. import _sim
 
 
 class Intrinsics:
@@ -62,6 +65,16 @@ class Intrinsics:
         radians: Angle between the lower and the upper edge [rad], between 0 and pi.
         """
         return {"fovy": {"radians": radians}}
+
+    @staticmethod
+    def from_matrix(matrix: ArrayLike) -> dict[str, Any]:
+        """Intrinsics from the matrix ``[[fx, 0, cx], [0, fy, cy], [0, 0, 1]]`` [pixels]."""
+        return _sim._intrinsics_from_matrix(matrix)
+
+    @staticmethod
+    def matrix(intrinsics: Mapping[str, Any], width: int, height: int) -> NDArray[Any]:
+        """The 3x3 intrinsic matrix in pixels of an image of ``width`` by ``height``."""
+        return _sim._intrinsics_matrix(intrinsics, width, height)
 
 
 class CameraRenderer:

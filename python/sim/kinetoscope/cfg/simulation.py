@@ -9,6 +9,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, Literal, TypeAlias
 
+from numpy.typing import NDArray
+
+from .. import _sim
 from .shapes import SurfaceCfg
 
 Integrator: TypeAlias = Literal["euler", "rk4", "implicit", "implicit_fast"]
@@ -199,3 +202,11 @@ class SimulationManagerCfg:
     def legged(cls, **fields: Any) -> SimulationManagerCfg:
         """Preset of the Rust library."""
         return cls(**{"physics_dt": 0.005, "cone": "elliptic", "impratio": 100.0, **fields})
+
+    def env_origins(self) -> NDArray[Any]:
+        """Origins of the environments in the overview [m], shape (N, 3): a grid with ``arena_space`` between neighbors.
+
+        rows = ceil(n / floor(sqrt n)), cols = ceil(n / rows); environment k is in row k div cols, column k mod cols.
+        Rows follow each other along -x, columns along +y. The center of the grid is the origin.
+        """
+        return _sim._simulation_manager_cfg_env_origins(self)
