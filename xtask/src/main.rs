@@ -9,7 +9,7 @@
 //! | `demo`, `test`, `ci`, `site` (`docs`), `python_package`, `python_simulation` (`wheel`), `python_cfg`, `bench`, `physics_report`, `mutate`, `fuzz`, `soak`, `bless`, `package` | the commands |
 //! | `setup`, `wheel`, `robots`, `python` | installation of MuJoCo, robots and Python packages |
 //! | `run`, `own_time`, `progress` | child processes, their processor time, progress lines |
-//! | `dependencies`, `import_cycles`, `source_check`, `docs_check` | checks of dependencies, import cycles, sources and pages |
+//! | `dependencies`, `import_cycles`, `source_check`, `docs_check`, `faults` | checks of dependencies, import cycles, sources and pages |
 //! | `language`, `spelling` | checks of words, retired names and spelling |
 //! | `examples`, `same_images` | the table of example runs, and the comparison of their images |
 //! | `physics_page`, `svg` | the page of the laws of physics, and its plots |
@@ -25,6 +25,7 @@ mod deny;
 mod dependencies;
 mod docs_check;
 mod examples;
+mod faults;
 mod fuzz;
 mod import_cycles;
 mod language;
