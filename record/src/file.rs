@@ -168,6 +168,42 @@ pub(crate) mod tests {
     use std::io::SeekFrom;
     use std::sync::Mutex;
 
+    /// A file whose writes are counted with those of all files of the disk, and fail from one of them on.
+    #[derive(Debug)]
+    struct FailingFile {
+        file: File,
+        writes: Arc<Mutex<usize>>,
+        first_failure: usize,
+        kind: io::ErrorKind,
+    }
+
+    impl Storage for FailingFile {
+        fn sync(&self) -> io::Result<()> {
+            self.file.sync_all()
+        }
+    }
+
+    impl Write for FailingFile {
+        fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+            let mut writes = self.writes.lock().unwrap();
+            *writes += 1;
+            if *writes > self.first_failure {
+                return Err(io::Error::new(self.kind, "a failure on purpose"));
+            }
+            self.file.write(bytes)
+        }
+
+        fn flush(&mut self) -> io::Result<()> {
+            self.file.flush()
+        }
+    }
+
+    impl Seek for FailingFile {
+        fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
+            self.file.seek(to)
+        }
+    }
+
     /// A file on a disk that is full after a number of bytes, which all its files share.
     #[derive(Debug)]
     struct OnFullDisk {
@@ -176,6 +212,17 @@ pub(crate) mod tests {
     }
 
     impl StorageFactory {
+        /// A disk whose writes fail after `first_failure` of them, and the number of writes so far.
+        pub(crate) fn failing_after(first_failure: usize, kind: io::ErrorKind) -> (Self, Arc<Mutex<usize>>) {
+            let writes = Arc::new(Mutex::new(0));
+            let shared = Arc::clone(&writes);
+            let wrap = move |file| {
+                let writes = Arc::clone(&shared);
+                Box::new(FailingFile { file, writes, first_failure, kind }) as Box<dyn Storage>
+            };
+            (Self(Some(Arc::new(wrap))), writes)
+        }
+
         /// A disk with room for a number of bytes, which all its files share.
         pub(crate) fn full_after(bytes: usize) -> Self {
             let left = Arc::new(Mutex::new(bytes));

@@ -93,14 +93,28 @@ impl PartialFolder {
     }
 
     /// True if the folder may be created: nothing is there, or an empty folder, or a recorder's folder that may be
-    /// replaced.
+    /// replaced. A recorder that was killed before it created its marker left a partial folder of empty folders.
     fn is_available(&self, path: &Path) -> io::Result<bool> {
         match fs::read_dir(path) {
-            Ok(mut entries) => Ok(entries.next().is_none() || (self.overwrite && path.join(self.marker).is_file())),
+            Ok(mut entries) => {
+                let has_marker = || self.overwrite && path.join(self.marker).is_file();
+                Ok(entries.next().is_none() || has_marker() || (path == self.part && !has_file(path)?))
+            }
             Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(true),
             Err(error) => Err(error),
         }
     }
+}
+
+/// True if a folder or one of the folders in it contains anything but folders.
+fn has_file(folder: &Path) -> io::Result<bool> {
+    for entry in fs::read_dir(folder)? {
+        let entry = entry?;
+        if !entry.file_type()?.is_dir() || has_file(&entry.path())? {
+            return Ok(true);
+        }
+    }
+    Ok(false)
 }
 
 /// Removes a folder, if it exists.
@@ -136,5 +150,27 @@ mod tests {
         make("new").commit().unwrap();
         assert_eq!(fs::read_to_string(path.join("what")).unwrap(), "new");
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+    }
+
+    /// Root cause: a recorder that was killed between the creation of its folders and of its marker left a partial folder
+    /// that no later recorder took, even with the permission to overwrite.
+    #[test]
+    fn folders_of_a_killed_recorder() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("run");
+        fs::create_dir_all(partial_path_of(&path).join("meta")).unwrap();
+        let (part, marker) = PartialFolder::create(&path, false, "meta/marker").unwrap();
+        drop((part, marker));
+        // Control: a file of an unknown program stays.
+        fs::remove_file(partial_path_of(&path).join("meta/marker")).unwrap();
+        fs::write(partial_path_of(&path).join("meta/other"), "precious").unwrap();
+        for overwrite in [false, true] {
+            let error = PartialFolder::create(&path, overwrite, "meta/marker").unwrap_err();
+            assert!(matches!(error, RecordError::Unfinished { .. }), "{error}");
+        }
+        // Folders of the final name are not a recorder's.
+        fs::create_dir_all(folder.path().join("other/inside")).unwrap();
+        let error = PartialFolder::create(&folder.path().join("other"), true, "meta/marker").unwrap_err();
+        assert!(matches!(error, RecordError::Exists { .. }), "{error}");
     }
 }

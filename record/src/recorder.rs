@@ -20,6 +20,7 @@ use resolve::{create_writer, packed_scene, resolve};
 use std::any::Any;
 use std::collections::BTreeSet;
 use std::fmt;
+use std::io;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, TryRecvError, channel, sync_channel};
@@ -230,7 +231,10 @@ impl Recorder {
         let (flag, reason) = (Arc::clone(&failed), Arc::clone(&why));
         let work = move || writer::run(sink, &streams, &filled, &empty, &flag, &reason);
         let thread = std::thread::Builder::new().name("recording".into()).spawn(work);
-        let thread = thread.map_err(|error| RecordError::file(&cfg.path, error))?;
+        let thread = thread.map_err(|error| {
+            let message = format!("cannot start the thread of the recorder: {error}");
+            RecordError::file(&cfg.path, io::Error::new(error.kind(), message))
+        })?;
         let clock = RecordingClock::new(sim.cfg().physics_dt, sim.observers().steps(), &sim.time());
         let summary = RecordingSummary { path: cfg.path.clone(), left_out, ..RecordingSummary::default() };
         let mut recorder = Self {

@@ -14,9 +14,12 @@ pub enum SensorError {
         /// The physics step \[s\].
         dt: f64,
     },
-    /// The sensor panicked during a measurement.
-    #[error("the sensor panicked during a measurement")]
-    Panicked,
+    /// The sensor panicked. It is not called again until it is rebuilt.
+    #[error("the sensor panicked: {message}")]
+    Panicked {
+        /// Message of the panic.
+        message: String,
+    },
     /// The update period is negative, infinite, not a number, or at least 2^53 physics steps.
     #[error("update_period is {update_period} s; it must be 0 (every step) or a positive number")]
     InvalidPeriod {

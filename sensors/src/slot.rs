@@ -6,6 +6,8 @@ use crate::schedule::{Phases, Schedule};
 use crate::sensor::Sensor;
 use kinetoscope_scene::SceneState;
 use kinetoscope_scene::StateFields;
+use std::any::Any;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 
 /// An eager or [lazy](crate::SensorCfg::lazy) sensor in its owner. The owner forwards all updates, resets and refreshes
 /// to the slot, and reads the sensor through it.
@@ -22,7 +24,7 @@ pub struct SensorSlot {
     stored_state: Option<SceneState>,
     /// Environments that are due. Only used within an update, kept for its memory.
     due: Vec<bool>,
-    /// The sensor, outdated while the stored state is not measured yet. Empty after a panic during a measurement.
+    /// The sensor, outdated while the stored state is not measured yet.
     sensor: Cached<SensorAndError>,
 }
 
@@ -34,13 +36,26 @@ struct SensorAndError {
 }
 
 impl SensorAndError {
-    /// Calls the sensor, unless it failed before.
+    /// Calls the sensor, unless it failed before. A panic is an error of this sensor: the others are called, too.
     fn call(&mut self, act: impl FnOnce(&mut dyn Sensor) -> Result<(), SensorError>) {
         if self.error.is_none() {
-            self.error = act(self.sensor.as_mut()).err();
+            let sensor = self.sensor.as_mut();
+            self.error = match catch_unwind(AssertUnwindSafe(|| act(sensor))) {
+                Ok(result) => result.err(),
+                Err(panic) => Some(SensorError::Panicked { message: message_of(panic.as_ref()) }),
+            };
         }
     }
 }
+
+/// Message of a panic.
+fn message_of(panic: &(dyn Any + Send)) -> String {
+    let text = panic.downcast_ref::<&str>().map(|text| (*text).to_string());
+    text.or_else(|| panic.downcast_ref::<String>().cloned()).unwrap_or_else(|| "no message".into())
+}
+
+/// Error of a slot without a sensor, which no call leaves behind.
+static NO_SENSOR: SensorError = SensorError::Panicked { message: String::new() };
 
 impl SensorSlot {
     /// Creates a slot for a sensor of `num_envs` environments. `requires` are the requirements of its configuration;
@@ -153,12 +168,10 @@ impl SensorSlot {
     ///
     /// # Errors
     ///
-    /// The error of the sensor. If a measurement panics, the panic propagates to the first reader; later reads return
-    /// [`SensorError::Panicked`].
+    /// The error of the sensor, or [`SensorError::Panicked`] if it panicked.
     pub fn sensor(&self) -> Result<&dyn Sensor, &SensorError> {
-        // A sensor that panicked is lost: its state is unknown.
-        let panicked = || Err(&SensorError::Panicked);
-        let holder = self.sensor.get_or_update(panicked, |holder| {
+        let missing = || Err(&NO_SENSOR);
+        let holder = self.sensor.get_or_update(missing, |holder| {
             if let Some(kept) = &self.stored_state {
                 holder.call(|sensor| sensor.update(kept));
             }
@@ -179,11 +192,11 @@ impl SensorSlot {
         match self.up_to_date() {
             Some(SensorAndError { error: None, sensor }) => Ok(sensor.as_mut()),
             Some(SensorAndError { error: Some(fault), .. }) => Err(fault),
-            None => Err(&SensorError::Panicked),
+            None => Err(&NO_SENSOR),
         }
     }
 
-    /// Returns the sensor and its error after measuring the stored state; `None` if a measurement panicked.
+    /// Returns the sensor and its error after measuring the stored state.
     fn up_to_date(&mut self) -> Option<&mut SensorAndError> {
         // An error is returned by the next read.
         let _ = self.sensor();

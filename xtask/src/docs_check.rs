@@ -1,7 +1,8 @@
-//! Checks of the documentation pages: their commands parse, their links have targets, the book contains all pages, and
-//! their Rust blocks are compiled as doc tests.
+//! Checks of the documentation pages: their commands parse, their links have targets, the book contains all pages, their
+//! Rust blocks are compiled as doc tests, and the tests in the table of faults exist.
 
 use crate::Cli;
+use crate::faults;
 use crate::run::{Repo, XtaskResult, no_findings};
 use crate::source_check::files_below;
 use clap::Parser;
@@ -10,7 +11,7 @@ const README: &str = "README.md";
 /// The two commands for new users. CI runs both as they are written.
 pub(crate) const README_COMMANDS: [&str; 2] = ["cargo xtask demo", TEST_COMMAND];
 pub(crate) const TEST_COMMAND: &str = "cargo xtask test";
-const NEEDED: [&str; 3] = [README, "ARCHITECTURE.md", "CONTRIBUTING.md"];
+const NEEDED: [&str; 4] = [README, "ARCHITECTURE.md", "CONTRIBUTING.md", faults::PAGE];
 /// The table of contents of the book.
 const SUMMARY: &str = "docs/SUMMARY.md";
 /// Files that compile the Rust blocks of pages.
@@ -40,6 +41,9 @@ pub(crate) fn run(repo: &Repo) -> XtaskResult {
             findings.push(format!("{path} is not a chapter of the book; add it to {SUMMARY}"));
         }
         findings.extend(uncompiled_blocks(path, &page, &doc_tests));
+        if path == faults::PAGE {
+            findings.extend(faults::findings(&page, |path| repo.read(path).ok()));
+        }
         let folder = path.rsplit_once('/').map_or("", |(folder, _)| folder);
         for link in relative_links(&page) {
             if !repo.root.join(folder).join(&link).exists() {

@@ -1,15 +1,15 @@
-//! The project's commands: `cargo xtask demo | test | ci | docs | wheel | bench | physics-report | mutate | fuzz | bless |
-//! package | python-cfg`.
+//! The project's commands: `cargo xtask demo | test | ci | docs | wheel | bench | physics-report | mutate | fuzz | soak |
+//! bless | package | python-cfg`.
 //!
 //! Every command first installs missing software on the machine (`setup.rs`). This crate depends on no crate with
 //! MuJoCo, so that it builds before MuJoCo is installed.
 //!
 //! | module | content |
 //! |---|---|
-//! | `demo`, `test`, `ci`, `site` (`docs`), `python_package`, `python_simulation` (`wheel`), `python_cfg`, `bench`, `physics_report`, `mutate`, `fuzz`, `bless`, `package` | the commands |
+//! | `demo`, `test`, `ci`, `site` (`docs`), `python_package`, `python_simulation` (`wheel`), `python_cfg`, `bench`, `physics_report`, `mutate`, `fuzz`, `soak`, `bless`, `package` | the commands |
 //! | `setup`, `wheel`, `robots`, `python` | installation of MuJoCo, robots and Python packages |
 //! | `run`, `own_time`, `progress` | child processes, their processor time, progress lines |
-//! | `dependencies`, `import_cycles`, `source_check`, `docs_check` | checks of dependencies, import cycles, sources and pages |
+//! | `dependencies`, `import_cycles`, `source_check`, `docs_check`, `faults` | checks of dependencies, import cycles, sources and pages |
 //! | `language`, `spelling` | checks of words, retired names and spelling |
 //! | `examples`, `same_images` | the table of example runs, and the comparison of their images |
 //! | `physics_page`, `svg` | the page of the laws of physics, and its plots |
@@ -25,6 +25,7 @@ mod deny;
 mod dependencies;
 mod docs_check;
 mod examples;
+mod faults;
 mod fuzz;
 mod import_cycles;
 mod language;
@@ -45,6 +46,7 @@ mod run;
 mod same_images;
 mod setup;
 mod site;
+mod soak;
 mod source_check;
 mod spelling;
 mod svg;
@@ -86,6 +88,10 @@ enum Task {
     Mutate(mutate::MutateArgs),
     /// Feed arbitrary input to the readers of files and requests, with a nightly compiler
     Fuzz(fuzz::FuzzArgs),
+    /// Run a mixed job for a long time, and fail if memory, file descriptors or threads grow
+    ///
+    /// A short run says which growth it could have found. All samples are written to target/soak.csv.
+    Soak(soak::SoakArgs),
     /// Rewrite the golden files of the tests with the current output
     Bless(bless::BlessArgs),
     /// Make the packages for crates.io, and compile each from its archive
@@ -106,6 +112,7 @@ impl Cli {
             Task::PhysicsReport(args) => physics_report::run(repo, args),
             Task::Mutate(args) => mutate::run(repo, args),
             Task::Fuzz(args) => fuzz::run(repo, args),
+            Task::Soak(args) => soak::run(repo, args),
             Task::Bless(args) => bless::run(repo, args),
             Task::Package => package::compile_all(repo),
             Task::PythonCfg(args) => python_cfg::run(repo, args),

@@ -19,6 +19,23 @@ const FORBID_UNSAFE: [&str; 10] = [
     "record/src/lib.rs",
     "viewer/src/lib.rs",
 ];
+/// Sources of the libraries.
+const LIBRARIES: [&str; 14] = [
+    "src/",
+    "exec/src/",
+    "http/src/",
+    "look/src/",
+    "mujoco/src/",
+    "plot/src/",
+    "record/src/",
+    "render/src/",
+    "robot/src/",
+    "scene/src/",
+    "sensors/src/",
+    "sim/src/",
+    "tasks/src/",
+    "viewer/src/",
+];
 /// Largest number of lines of a file.
 const MAX_LINES: usize = 800;
 /// Largest number of public methods of `SimulationManager`; further ones belong to its views and handles.
@@ -53,6 +70,7 @@ pub(crate) fn run(repo: &Repo) -> XtaskResult {
     findings.extend(stubs(&files));
     findings.extend(foreign_paths(&files));
     findings.extend(large_api(&files));
+    findings.extend(wall_clocks(&files));
     findings.extend(dependencies_without_reason(&repo.read("Cargo.toml")?));
     findings.extend(tests_that_never_run(&files, &folders_without_tests(&repo.metadata, &repo.root)));
     no_findings("rules of the tree are broken", &findings)
@@ -111,6 +129,26 @@ fn misplaced_unsafe(files: &[TextFile]) -> Vec<String> {
                 ));
             }
         }
+    }
+    findings
+}
+
+/// Uses of the wall clock in libraries. It jumps when it is set; the libraries measure time with the monotonic clock.
+fn wall_clocks(files: &[TextFile]) -> Vec<String> {
+    let is_library = |path: &str| {
+        LIBRARIES.iter().any(|folder| path.strip_prefix(folder).is_some_and(|rest| !rest.contains("tests")))
+    };
+    let mut findings = Vec::new();
+    for file in files.iter().filter(|file| file.is_rust() && is_library(&file.path)) {
+        let code = code_only(&file.text);
+        // Up to the tests at the end of the file.
+        let is_tests = |(at, _): &(usize, &str)| code[*at..].lines().nth(1).is_some_and(|line| line.ends_with('{'));
+        let tests = code.match_indices("#[cfg(test)]\nmod").find(is_tests).map_or(code.len(), |(at, _)| at);
+        let code = &code[..tests];
+        let found = words(code).filter(|(_, word)| ["SystemTime", "UNIX_EPOCH"].contains(word));
+        findings.extend(found.map(|(at, word)| {
+            format!("{}:{}: `{word}` jumps when the clock is set; use `Instant`", file.path, line_of(code, at))
+        }));
     }
     findings
 }
@@ -452,6 +490,22 @@ mod tests {
             files.extend(file(path, "#![forbid(unsafe_code)]\n"));
         }
         assert_eq!(missing_forbid(&files), ["sensors/src/lib.rs: must say #![forbid(unsafe_code)]"]);
+    }
+
+    #[test]
+    fn wall_clock() {
+        let code = "use std::time::SystemTime;\nlet now = SystemTime::now();";
+        for (path, text, found) in [
+            ("record/src/clock.rs", code, 2),
+            ("src/lib.rs", "let t = std::time::UNIX_EPOCH;", 1),
+            ("record/src/tests/kill.rs", code, 0),
+            ("cli/src/main.rs", code, 0),
+            ("sim/src/a.rs", "// SystemTime\nlet now = Instant::now();", 0),
+            ("sim/src/a.rs", "fn f() {}\n#[cfg(test)]\nmod tests {\n use std::time::SystemTime;\n}", 0),
+            ("sim/src/a.rs", "#[cfg(test)]\nmod tests;\nuse std::time::SystemTime;", 1),
+        ] {
+            assert_eq!(wall_clocks(&file(path, text)).len(), found, "{path}: {text}");
+        }
     }
 
     #[test]

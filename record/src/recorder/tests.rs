@@ -140,26 +140,28 @@ fn full_disk_images() {
     }
 }
 
+/// A simulation with an actuator, as datasets need.
+fn actuated(num_envs: usize) -> SimulationManager {
+    let mut sim = crate::tests::simulation(num_envs);
+    let text = r#"<mujoco><worldbody><body name="b" pos="0 0 1"><joint name="j" type="slide"/><geom size="0.1"/></body></worldbody>
+        <actuator><motor joint="j"/></actuator></mujoco>"#;
+    sim.add_mjcf(MjcfPartCfg::text("ball", text)).unwrap();
+    sim
+}
+
 /// On a full disk, a dataset has neither its final name nor the file that makes it a dataset.
 #[test]
 #[cfg_attr(not(feature = "lerobot"), ignore = "needs the feature lerobot")]
 fn full_disk_dataset() {
     let folder = tempfile::tempdir().unwrap();
-    let actuated = || {
-        let mut sim = crate::tests::simulation(2);
-        let text = r#"<mujoco><worldbody><body name="b" pos="0 0 1"><joint name="j" type="slide"/><geom size="0.1"/></body></worldbody>
-            <actuator><motor joint="j"/></actuator></mujoco>"#;
-        sim.add_mjcf(MjcfPartCfg::text("ball", text)).unwrap();
-        sim
-    };
     let whole = folder.path().join("whole.lerobot");
-    let bytes = record_to_a_full_disk(&mut actuated(), &whole, usize::MAX).unwrap().bytes as usize;
+    let bytes = record_to_a_full_disk(&mut actuated(2), &whole, usize::MAX).unwrap().bytes as usize;
     assert!(whole.join("meta/info.json").is_file() && bytes > 10_000, "{bytes}");
     // No room; full in the rows; in the tables at the end; in the last file.
     for left in [0, 1000, bytes / 2, bytes - 100] {
         let path = folder.path().join(format!("left_{left}.lerobot"));
         let part = partial_path_of(&path);
-        assert_too_small(&mut actuated(), &path, left, Some(&part));
+        assert_too_small(&mut actuated(2), &path, left, Some(&part));
         assert!(!part.join("meta/info.json").exists(), "{left}");
     }
 }
@@ -187,6 +189,72 @@ fn full_disk_files() {
         // Control: the same recording on a disk with room.
         record_to_a_full_disk(&mut simulation(), &folder.path().join(format!("whole.{name}")), usize::MAX).unwrap();
     }
+}
+
+/// Every write of a recording fails once, as on a full or read-only disk: the error is reported, and no file has its final
+/// name. What remains of an MCAP file can be recovered, or the error says that it holds no message.
+#[test]
+fn every_write() {
+    let simulation = |name: &str| {
+        if name == "run.lerobot" {
+            return actuated(1);
+        }
+        let mut sim = falling(1);
+        sim.add_sensor("imu", ImuCfg::on("ball/ball")).unwrap();
+        let channels = Channels { color: true, ..Channels::NONE };
+        let camera = CameraCfg { width: 32, height: 24, channels, update_period: 0.02, ..CameraCfg::default() };
+        sim.add_sensor("camera", camera).unwrap();
+        sim
+    };
+    let record = |path: &Path, first_failure: usize, kind: io::ErrorKind| {
+        let mut sim = simulation(path.file_name().unwrap().to_str().unwrap());
+        let (disk, writes) = StorageFactory::failing_after(first_failure, kind);
+        let begin = |sim: &mut SimulationManager| {
+            let recorder = Recorder::start(sim, RecorderCfg::new(path), &disk)?;
+            let recorder = sim.observers_mut().add(recorder);
+            sim.update(12);
+            sim.finish_recording(recorder)
+        };
+        let result = begin(&mut sim);
+        // The simulation goes on.
+        let before = sim.observers().steps();
+        sim.update(1);
+        assert_eq!(sim.observers().steps(), before + 1);
+        let writes = *writes.lock().unwrap();
+        (result, writes)
+    };
+    let mut failures = 0;
+    for (format, end) in Format::all().filter(|(format, _)| format.is_built()) {
+        let name = if end.is_empty() { "images".to_string() } else { format!("run.{end}") };
+        let (folder, path) = scratch(&name);
+        // Control: nothing fails, and the writes are counted.
+        let (result, count) = record(&path, usize::MAX, io::ErrorKind::Other);
+        result.unwrap();
+        assert!(count > 0 && path.exists(), "{name}: {count} writes");
+        println!("{name}: {count} writes");
+        drop(folder);
+        // At most 40 of the writes, spread evenly, with the first and the last one.
+        for first in (0..count).step_by(count.div_ceil(40)).chain([count - 1]) {
+            let kind = [io::ErrorKind::StorageFull, io::ErrorKind::ReadOnlyFilesystem][first % 2];
+            let (folder, path) = scratch(&name);
+            let (result, _) = record(&path, first, kind);
+            let Err(error) = result else { panic!("{name}: the failure of write {first} of {count} was lost") };
+            let text = error.to_string();
+            assert!(text.contains("a failure on purpose") && text.contains(&name), "{name}, {first}: {text}");
+            assert!(!path.exists(), "{name}, {first}");
+            let keeps = matches!(format, Format::Mcap | Format::Images | Format::LeRobot);
+            assert!(keeps || names(&folder).is_empty(), "{name}, {first}: {:?}", names(&folder));
+            let part = partial_path_of(&path);
+            if format == Format::Mcap && part.exists() {
+                match recover(&path) {
+                    Ok(recovered) => assert!(recovered.messages > 0 && path.exists() && !part.exists()),
+                    Err(error) => assert!(error.to_string().contains("run.mcap.part"), "{first}: {error}"),
+                }
+            }
+            failures += 1;
+        }
+    }
+    assert!(failures > 20, "{failures}");
 }
 
 /// A sensor with one channel of any name.

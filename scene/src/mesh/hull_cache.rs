@@ -172,6 +172,9 @@ pub(super) fn store(file: &Path, bytes: &[u8]) -> std::io::Result<()> {
 #[cfg(test)]
 mod tests {
     use std::fs;
+    use std::process::Stdio;
+
+    use kinetoscope_testkit::process;
 
     use super::*;
     use crate::mesh::dae::tests::document;
@@ -246,6 +249,55 @@ mod tests {
             }
         }
         assert_eq!(fs::read_dir(cache.dir().unwrap()).unwrap().count(), 2);
+    }
+
+    /// Set in child processes only: the folder of the mesh and of the cache.
+    const FOLDER: &str = "KINETOSCOPE_TEST_CACHE";
+
+    /// Four processes read, write, delete and damage the same entry: each of them gets the right hull every time, and no
+    /// temporary file remains.
+    #[test]
+    fn several_processes() {
+        let scratch = tempfile::tempdir().unwrap();
+        cube(scratch.path());
+        let start = |_| {
+            let mut command = process::command(module_path!(), "scenario_shared_entry");
+            command.env(FOLDER, scratch.path()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap()
+        };
+        let children: Vec<_> = (0..4).map(start).collect();
+        for child in children {
+            let output = child.wait_with_output().unwrap();
+            let all = format!("{}{}", process::text(&output.stdout), process::text(&output.stderr));
+            assert!(output.status.success() && all.contains("1 passed"), "{all}");
+        }
+        let file = only_file(&scratch.path().join("cache"));
+        assert!(file.extension().is_some_and(|end| end == "hull"), "{}", file.display());
+    }
+
+    #[test]
+    #[ignore = "runs in a process of its own"]
+    fn scenario_shared_entry() {
+        let Some(folder) = std::env::var_os(FOLDER).map(PathBuf::from) else { return };
+        let (mesh, cache) = (folder.join("cube.stl"), HullCache::at(folder.join("cache")));
+        let (scale, cfg) = ([1.0, 2.0, 3.0], HullCfg::default());
+        let fresh = HullCache::disabled().hull_of_file(&mesh, scale, &cfg).unwrap();
+        for round in 0..300 {
+            assert_eq!(cache.hull_of_file(&mesh, scale, &cfg).unwrap(), fresh, "round {round}");
+            let entries = fs::read_dir(cache.dir().unwrap()).unwrap().map(|entry| entry.unwrap().path());
+            let entry = entries.into_iter().find(|path| path.extension().is_some_and(|end| end == "hull"));
+            match (round % 5, entry) {
+                // Another process may have deleted the file.
+                (1, Some(entry)) => drop(fs::remove_file(entry)),
+                // Half of a file, as of a disk that was full.
+                (3, Some(entry)) => {
+                    if let Ok(bytes) = fs::read(&entry) {
+                        fs::write(&entry, &bytes[..bytes.len() / 2]).unwrap();
+                    }
+                }
+                _ => {}
+            }
+        }
+        assert_eq!(cache.hull_of_file(&mesh, scale, &cfg).unwrap(), fresh);
     }
 
     #[test]

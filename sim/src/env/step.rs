@@ -463,6 +463,7 @@ fn classify_step(done: Result<(), EngineError>, raised: &WarningCounts) -> StepO
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::batch::Batch;
     use mj::Buffers;
     use std::sync::Arc;
 
@@ -487,5 +488,55 @@ mod tests {
         assert!(["s0", "s1", "s2"].contains(&&*bodies[0]), "{bodies:?}");
         let text = reason.to_string();
         assert!(text.contains("do not fit into 2 GiB; expected fewer bodies that overlap; most contacts: s"), "{text}");
+    }
+
+    /// The same in one of 64 environments: it is stopped at its last state, and the others have the bits of a batch
+    /// without such an environment.
+    #[test]
+    fn exhausted_buffers_of_one_of_64() {
+        let sphere = |k: usize| format!("<body name='s{k}' pos='{k} 0 0.1'><freejoint/><geom size='0.1'/></body>");
+        let spheres: String = (0..12).map(sphere).collect();
+        let text = format!("<mujoco><worldbody><geom type='plane' size='20 1 1'/>{spheres}</worldbody></mujoco>");
+        let model = mj::compile(&text, &[]).expect("compiles").into_model();
+        let few = model.with_buffers(Buffers { contacts: 12, constraints: 48, arena_bytes: 1 << 17 });
+        let batch = || {
+            let mut batch =
+                Batch::new(&few, &Arc::default(), 64, 1, kinetoscope_exec::ThreadPool::new()).expect("small");
+            batch.run(|i, env| {
+                env.max_bytes = 0;
+                env.write(|data| data.qvel_mut()[0] = 0.01 * i as f64);
+            });
+            batch.step(2);
+            batch
+        };
+        let bits = |batch: &Batch, i: usize| {
+            batch.read(i, |env| {
+                let data = env.data();
+                let all = [data.qpos(), data.qvel(), data.qacc_warmstart()];
+                all.into_iter().flatten().map(|x| x.to_bits()).collect::<Vec<_>>()
+            })
+        };
+        let (mut crowded, mut calm) = (batch(), batch());
+        crowded.run(|i, env| {
+            if i == 17 {
+                env.write(|data| (0..10).for_each(|k| data.qpos_mut()[7 * k] = 1e-3 * k as f64));
+            }
+        });
+        crowded.step(30);
+        calm.step(30);
+        let status = crowded.read(17, |env| env.status().clone());
+        let EnvStatus::Diverged { reason: Divergence::BuffersExhausted { .. }, .. } = status else {
+            panic!("{status:?}")
+        };
+        let different: Vec<usize> = (0..64).filter(|&i| bits(&crowded, i) != bits(&calm, i)).collect();
+        assert_eq!(different, [17]);
+        // It is revived by a reset.
+        crowded.run(|i, env| {
+            if i == 17 {
+                env.reset(|_, _| ());
+            }
+        });
+        crowded.step(1);
+        assert_eq!(crowded.read(17, |env| env.status().clone()), EnvStatus::Running);
     }
 }

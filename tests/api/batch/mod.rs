@@ -1,8 +1,9 @@
-//! Batches of environments: determinism, growing buffers, diverged environments, errors of the engine, recompilation,
-//! and freed resources.
+//! Batches of environments: determinism, growing buffers, limits of the system, diverged environments, errors of the engine,
+//! recompilation, and freed resources.
 
 mod determinism;
 mod growth;
+mod limits;
 mod processes;
 mod quarantine;
 mod recompile;

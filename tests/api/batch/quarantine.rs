@@ -13,12 +13,14 @@ use std::sync::Arc;
 
 type BlowUp = (&'static str, fn(&mut Data), Warning);
 
-const BLOW_UPS: [BlowUp; 6] = [
+const BLOW_UPS: [BlowUp; 8] = [
     ("velocity huge", |d| d.qvel_mut()[0] = f64::MAX, Warning::BadVelocity),
+    ("velocity infinite", |d| d.qvel_mut()[1] = f64::NEG_INFINITY, Warning::BadVelocity),
     ("velocity NaN", |d| d.qvel_mut()[3] = f64::NAN, Warning::BadVelocity),
     ("position infinite", |d| d.qpos_mut()[2] = f64::INFINITY, Warning::BadPosition),
     ("joint NaN", |d| d.qpos_mut()[7] = f64::NAN, Warning::BadPosition),
     ("force huge", |d| d.xfrc_applied_mut()[6] = 1e300, Warning::BadAcceleration),
+    ("force infinite", |d| d.xfrc_applied_mut()[7] = f64::INFINITY, Warning::BadAcceleration),
     ("force NaN", |d| d.xfrc_applied_mut()[8] = f64::NAN, Warning::BadAcceleration),
 ];
 

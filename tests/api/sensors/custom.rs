@@ -3,9 +3,11 @@
 use super::worlds::{ball, sim, sr5};
 use kinetoscope::ndarray::array;
 use kinetoscope::prelude::*;
+use kinetoscope::record::{RecorderCfg, Topic};
 use kinetoscope::scene::SceneState;
 use kinetoscope::scene::StateFields;
 use kinetoscope::sensors::{SampleChannel, Sampler, Schedule, Sensor, SensorCfg, SensorContext, SensorError};
+use kinetoscope_testkit::error_tables::assert_error;
 use kinetoscope_testkit::tolerance::{Tolerance, assert_close};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
@@ -152,4 +154,89 @@ fn sampler() {
     // The newest sample of at least 4 steps of age is that of step 96.
     let limit = Tolerance::absolute(1e-12, "rounding of 96 sums of numbers up to 5");
     assert_close("speed", sim.sensor(id).unwrap().sampler.values("speed"), [9.81 * 96.0 * 0.005; 2], limit);
+}
+
+/// A sensor whose measurement panics at the third step.
+#[derive(Clone, Copy)]
+struct FragileCfg {
+    lazy: bool,
+}
+
+#[derive(Debug)]
+struct Fragile;
+
+impl SensorCfg for FragileCfg {
+    type Sensor = Fragile;
+
+    fn requires(&self) -> StateFields {
+        StateFields::POSES
+    }
+
+    fn lazy(&self, dt: f64) -> Option<Schedule> {
+        self.lazy.then(|| Schedule::new(0.0, dt, false).unwrap())
+    }
+
+    fn build(&self, _: &SensorContext) -> Result<Fragile, SensorError> {
+        Ok(Fragile)
+    }
+}
+
+impl Sensor for Fragile {
+    fn update(&mut self, state: &SceneState) -> Result<(), SensorError> {
+        assert!(state.step[0] < 3, "a mistake in the sensor at step {}", state.step[0]);
+        Ok(())
+    }
+
+    fn reset(&mut self, _: &[usize], _: &SceneState) -> Result<(), SensorError> {
+        Ok(())
+    }
+
+    fn refresh(&mut self, _: &[usize], _: &SceneState) -> Result<(), SensorError> {
+        Ok(())
+    }
+}
+
+/// Root cause: a panic of an eager sensor ended the step, so that later sensors and all observers missed it. A sensor that
+/// panics has an error, which names it. The others have the values that they have without it, until it is rebuilt.
+#[test]
+fn panics() {
+    let readings = |fragile: Option<FragileCfg>| {
+        let mut sim = sim(2);
+        sim.add_rigid_object(ball("ball", 0.05, 1.0, [0.0, 0.0, 90.0])).unwrap();
+        let fragile = fragile.map(|cfg| sim.add_sensor("fragile", cfg).unwrap());
+        let imu = sim.add_sensor("imu", ImuCfg::on("ball")).unwrap();
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("run.npz");
+        let topics = [Topic::ObjectPose("ball".into())];
+        let recorder = sim.record(RecorderCfg::new(&path).with_topics(topics)).unwrap();
+        for step in 1..=6 {
+            sim.update(1);
+            if let Some(id) = fragile {
+                let read = sim.sensor(id);
+                assert_eq!(read.is_ok(), step < 3, "step {step}");
+                if step >= 3 {
+                    assert_error(
+                        read,
+                        "SensorFault",
+                        &["\"fragile\"", "panicked", "a mistake in the sensor at step 3"],
+                    );
+                }
+            }
+        }
+        let summary = sim.finish_recording(recorder).unwrap();
+        let imu = sim.sensor(imu).unwrap();
+        let values =
+            (imu.pos_w().to_owned(), imu.lin_vel_b().to_owned(), imu.sample_counts().to_vec(), summary.packets);
+        if let Some(id) = fragile {
+            // A new entity rebuilds all sensors; a reset restarts them.
+            sim.add_rigid_object(ball("other", 0.05, 1.0, [5.0, 0.0, 90.0])).unwrap();
+            sim.reset(None).unwrap();
+            assert!(sim.sensor(id).is_ok());
+        }
+        values
+    };
+    let expected = readings(None);
+    for lazy in [false, true] {
+        assert_eq!(readings(Some(FragileCfg { lazy })), expected, "lazy: {lazy}");
+    }
 }

@@ -122,6 +122,8 @@ mod tests {
             ("slow motion", Speed::Factor(0.1), &[5, 15], 0, 1000),
             // One second behind: no wait, and the schedule restarts here.
             ("lost time is given up", Speed::REAL_TIME, &[0, 1, 2], 1000, 10),
+            // The machine slept for a day: no rush of eight million steps.
+            ("a day is given up", Speed::REAL_TIME, &[0, 1, 2], 86_400_000, 10),
         ] {
             pace.set_speed(speed, steps[0], start);
             let waits: Vec<_> =
