@@ -191,8 +191,8 @@ fn full_disk_files() {
     }
 }
 
-/// Every write of a recording fails once, as on a full or read-only disk: the error is reported, and no file has its final
-/// name. What remains of an MCAP file can be recovered, or the error says that it holds no message.
+/// Writes of a recording fail from any of them on, as on a full or read-only disk: the error is reported, and no file has
+/// its final name. What remains of an MCAP file can be recovered, or the error says that it holds no message.
 #[test]
 fn every_write() {
     let simulation = |name: &str| {
