@@ -284,6 +284,7 @@ LEFT_OUT = {
     "SimulationManager.mjcf_part": READS,
     "SimulationManager.with_mujoco": MUJOCO,
     "StereoCamera.left_from_right": GIVEN,
+    "TerrainGrid.check": "the other methods check the grid",
     "TerrainGrid.tile": "the shares of the tiles, which the program gave",
     "TerrainGrid.tile_seed": "for heights, which compute it",
     "Viewer.add_viewer": "SimulationManager.viewer",

@@ -264,24 +264,30 @@ def test_a_batch_is_its_single_rows(arm, rng):
 def test_other_threads_run_during_a_call(arm, method):
     """The interpreter is released: this thread counts while another one computes for a while."""
     rows = np.tile([3.0, 0, 0, 1, 0, 0, 0], (40, 1)) if method == "compute_ik" else np.zeros((400_000, 6))
-    began, spent = threading.Event(), []
+    tries = []
 
-    def compute():
+    def compute(began, spent):
         began.set()
         start = time.perf_counter()
         getattr(arm, method)(rows)
         spent.append(time.perf_counter() - start)
 
-    thread = threading.Thread(target=compute)
-    counted, longest, last = 0, 0.0, time.perf_counter()
-    thread.start()
-    began.wait()
-    while thread.is_alive():
-        time.sleep(0.001)
-        now = time.perf_counter()
-        counted, longest, last = counted + 1, max(longest, now - last), now
-    thread.join()
-    assert counted > 3 and longest < 0.7 * spent[0], (counted, longest, spent)
+    # A machine with other load may stop this thread for as long as the call takes, but not each time.
+    for _ in range(5):
+        began, spent = threading.Event(), []
+        thread = threading.Thread(target=compute, args=(began, spent))
+        counted, longest, last = 0, 0.0, time.perf_counter()
+        thread.start()
+        began.wait()
+        while thread.is_alive():
+            time.sleep(0.001)
+            now = time.perf_counter()
+            counted, longest, last = counted + 1, max(longest, now - last), now
+        thread.join()
+        if counted > 3 and longest < 0.7 * spent[0]:
+            return
+        tries.append((counted, longest, spent[0]))
+    pytest.fail(f"the interpreter was held: {tries}")
 
 
 FAR = [0.0, 0, 0, 0, 0, 0, 0]

@@ -107,7 +107,7 @@ impl PartialFolder {
 }
 
 /// True if a folder or one of the folders in it contains anything but folders.
-fn has_file(folder: &Path) -> io::Result<bool> {
+pub(crate) fn has_file(folder: &Path) -> io::Result<bool> {
     for entry in fs::read_dir(folder)? {
         let entry = entry?;
         if !entry.file_type()?.is_dir() || has_file(&entry.path())? {

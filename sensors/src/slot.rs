@@ -148,11 +148,14 @@ impl SensorSlot {
     }
 
     /// Returns the physics steps until the slot needs its next update. `step` is the step of each environment. For an
-    /// eager sensor, this is [`Sensor::due_in`] (`u64::MAX` after a panic); for a lazy one, its schedule decides.
+    /// eager sensor, this is [`Sensor::due_in`] (`u64::MAX` after an error); for a lazy one, its schedule decides.
     pub fn due_in(&self, step: &[u64]) -> u64 {
         match &self.phases {
             Some(phases) => phases.due_in(step.iter().copied()),
-            None => self.sensor.get().map_or(u64::MAX, |holder| holder.sensor.due_in(step)),
+            None => match self.sensor.get() {
+                Some(SensorAndError { sensor, error: None }) => sensor.due_in(step),
+                _ => u64::MAX,
+            },
         }
     }
 

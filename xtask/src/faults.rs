@@ -23,6 +23,9 @@ pub(crate) fn findings(page: &str, read: impl Fn(&str) -> Option<String>) -> Vec
             findings.push(format!("{PAGE}: a cell is empty: {row}"));
         }
         let tests: Vec<(&str, &str)> = named_tests(tests).collect();
+        if tests.len() != row.matches("[`").count() {
+            findings.push(format!("{PAGE}: a test of `{fault}` is no link; expected [`name`](../path)"));
+        }
         if tests.is_empty() {
             findings.push(format!("{PAGE}: no test for `{fault}`; expected [`name`](../path)"));
         }
@@ -83,6 +86,10 @@ mod tests {
             ("| killed | a file | a signal | [`scenario`](../a/b.rs) |", &["no test `scenario`"]),
             ("| full disk | an error | a wrapper | [`full_disk`](../a/c.rs) |", &["a/c.rs does not exist"]),
             ("| full disk | an error | a wrapper | full_disk |", &["no test for `full disk`"]),
+            (
+                "| full disk | an error | a wrapper | [`full_disk`](../a/b.rs), [`other`](a/b.rs) |",
+                &["a test of `full disk` is no link"],
+            ),
             ("| full disk |  | a wrapper | [`full_disk`](../a/b.rs) |", &["a cell is empty"]),
             ("| full disk | an error | [`full_disk`](../a/b.rs) |", &["3 cells instead of 4"]),
             ("", &["there is no table"]),

@@ -65,19 +65,25 @@ fn kibibytes(text: &str, key: &str) -> Option<u64> {
 mod tests {
     use super::*;
 
-    /// Memory, a file and a thread that are added on purpose are counted. Other tests of this process may add more.
+    /// Memory, files and threads that are added on purpose are counted. Other tests of this process add and remove fewer.
     #[test]
     fn what_is_added() {
         let before = Resources::now().unwrap();
         let held = std::hint::black_box(vec![1u8; 64 << 20]);
-        let file = std::fs::File::open("/proc/self/status").unwrap();
-        let thread = std::thread::spawn(|| std::thread::sleep(Duration::from_millis(200)));
+        let files: Vec<_> = (0..60).map(|_| std::fs::File::open("/proc/self/status").unwrap()).collect();
+        let (end, threads): (Vec<_>, Vec<_>) = (0..60)
+            .map(|_| {
+                let (end, is_over) = std::sync::mpsc::channel::<()>();
+                (end, std::thread::spawn(move || is_over.recv()))
+            })
+            .unzip();
         let after = Resources::now().unwrap();
         assert!(after.memory >= before.memory + (60 << 20), "{before:?} {after:?}");
-        assert!(after.files > before.files && after.threads > before.threads, "{before:?} {after:?}");
-        drop((held, file));
-        thread.join().unwrap();
-        assert!(Resources::settled(Some(&before)).unwrap().memory < after.memory);
+        assert!(after.files >= before.files + 40 && after.threads >= before.threads + 40, "{before:?} {after:?}");
+        drop((held, files, end));
+        threads.into_iter().for_each(|thread| drop(thread.join().unwrap()));
+        let settled = Resources::settled(Some(&before)).unwrap();
+        assert!(settled.memory < after.memory - (40 << 20), "{before:?} {after:?} {settled:?}");
     }
 
     #[test]

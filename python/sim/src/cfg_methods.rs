@@ -25,7 +25,9 @@ pub(crate) fn add(module: &Bound<'_, PyModule>) -> PyResult<()> {
 }
 
 fn grid(cfg: &Bound<'_, PyAny>) -> PyResult<TerrainGrid> {
-    cfg::read("TerrainGrid", Some(cfg))
+    let grid: TerrainGrid = cfg::read("TerrainGrid", Some(cfg))?;
+    guarded(|| Ok(grid.check()?))?;
+    Ok(grid)
 }
 
 #[pyfunction]

@@ -352,7 +352,9 @@ fn robot_cfg(obj: &Bound<'_, PyAny>) -> PyResult<RobotCfg> {
     let has = |field: &str| obj.cast::<PyMapping>().is_ok_and(|fields| fields.contains(field).unwrap_or(false));
     if cfg::type_of(obj)?.is_some() || has("urdf") || has("mjcf") {
         let mut fields = cfg::table("robot", Some(obj), None)?;
-        fields.remove("type");
+        if fields.get("type").is_some_and(|of| of.as_str() == Some("robot")) {
+            fields.remove("type");
+        }
         return match cfg::entity("robot", None, fields)? {
             (_, EntityCfg::Robot(cfg)) => Ok(*cfg),
             _ => Err(Failure::new(Class::Internal, "a robot of another type").into()),

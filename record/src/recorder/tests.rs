@@ -234,10 +234,15 @@ fn every_write() {
         println!("{name}: {count} writes");
         drop(folder);
         // At most 40 of the writes, spread evenly, with the first and the last one.
-        for first in (0..count).step_by(count.div_ceil(40)).chain([count - 1]) {
+        for first in (0..count).step_by(count.div_ceil(39)).chain([count - 1]) {
             let kind = [io::ErrorKind::StorageFull, io::ErrorKind::ReadOnlyFilesystem][first % 2];
             let (folder, path) = scratch(&name);
-            let (result, _) = record(&path, first, kind);
+            let (result, made) = record(&path, first, kind);
+            if made <= first {
+                // A slow machine flushes at other times, so the number of writes differs.
+                result.unwrap();
+                continue;
+            }
             let Err(error) = result else { panic!("{name}: the failure of write {first} of {count} was lost") };
             let text = error.to_string();
             assert!(text.contains("a failure on purpose") && text.contains(&name), "{name}, {first}: {text}");

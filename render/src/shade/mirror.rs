@@ -173,7 +173,8 @@ impl Mirrors<'_> {
                 let lanes = lanes & normal.dot(V3::splat(s, up)).simd_gt(splat(s, 0.5));
                 let mirrored_view = view.sub(normal.scale(view.dot(normal) * 2.0));
                 let display = context.shade.scene.lighting_space == LightingSpace::Display;
-                let group = RayGroup { origin: offset_origins(point), direction: mirrored_view };
+                // Rotations are accepted with a small error, so normals are not always of length 1.
+                let group = RayGroup { origin: offset_origins(point), direction: mirrored_view.unit(s) };
                 let candidates = &mut **self.candidates.borrow_mut();
                 self.tracer.find_candidates(s, group, lanes, self.skipped(), candidates);
                 let wanted = if self.bounded { candidates.lanes() } else { lanes.to_bitmask() };
@@ -249,6 +250,8 @@ impl Mirrors<'_> {
                 break;
             }
             hit_lanes |= left;
+            // The other rays hit nothing more.
+            rays.lanes = left;
             while left != 0 {
                 let first = left.trailing_zeros() as usize % LANES;
                 let Some(instance) = hits[first].map(|hit| self.tracer.instance_of(&hit)) else { break };

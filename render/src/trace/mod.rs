@@ -3,7 +3,8 @@
 //! Two levels of BVHs. The lower level has one BVH per mesh, in the mesh's own frame: built once, shared by all
 //! environments, and the same that ray casters use. The upper level is a BVH over the boxes of a frame's instances,
 //! built for every frame (`instance_bvh`). Shapes with a closed form are intersected exactly; height fields as the
-//! triangles that the rasterizer draws. Everything is in double precision.
+//! triangles that the rasterizer draws. Hits are in double precision;
+//! groups of rays choose the instances that they may hit in single precision, with a margin (`group`).
 //!
 //! The rays of an image need no upper BVH: an instance is tested only within the rectangle of the image that it covers.
 //! There its rays are cast in packets of eight, the nearest instances first. The rays fill the rasterizer's own
@@ -145,13 +146,13 @@ impl RoundBounds {
         let to = simd::V3::splat(s, self.center).sub(origin);
         let (square, along) = (to.dot(to), to.dot(direction));
         let radius = self.radius * self.radius;
-        // The differences lose digits, in proportion to the distance.
-        let near = (square - along * along).simd_le(square * 1e-6 + radius)
-            & (along.simd_ge(splat(s, 0.0)) | square.simd_le(splat(s, radius)));
+        // The differences lose digits, in proportion to the distance. Numbers that overflow are no reason to leave it out.
+        let near = !(square - along * along).simd_gt(square * 1e-6 + radius)
+            & !(along.simd_lt(splat(s, 0.0)) & square.simd_gt(splat(s, radius)));
         let across = direction.cross(simd::V3::splat(s, self.axis));
         let distance = to.dot(across);
         let limit = (square * 1e-9 + self.across * self.across) * across.dot(across);
-        near & (distance * distance).simd_le(limit + square * 1e-12)
+        near & !(distance * distance).simd_gt(limit + square * 1e-12)
     }
 }
 

@@ -8,7 +8,8 @@ use nalgebra::{Translation3, Unit, UnitQuaternion, Vector3};
 /// Kinematic chain from a base link to a frame, in a form that is fast to evaluate. Fixed joints are folded into the
 /// poses between moving joints. A mimic joint moves by the variable of its driver.
 ///
-/// The base is the root link, or the child of the last floating or planar joint above the frame. Floating and planar
+/// The base of [`Chain::new`] is the root link, or the child of the last floating or planar joint above the frame;
+/// [`Chain::between`] starts at any link below that. Floating and planar
 /// joints have no column; callers must know the pose of their child.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Chain {

@@ -187,8 +187,12 @@ impl TerrainGrid {
         (random.uniform() * 2f64.powi(53)) as u64
     }
 
-    /// Checks the numbers that no generator checks.
-    fn check(&self) -> Result<(), TerrainError> {
+    /// Checks the numbers of the grid: rows, columns, sizes and difficulties. Those of the tiles are checked when the
+    /// heights are computed.
+    ///
+    /// # Errors
+    /// A number is not in its range.
+    pub fn check(&self) -> Result<(), TerrainError> {
         let number = |field, value, expected| Err(TerrainError::Number { terrain: NAME, field, value, expected });
         for (field, count) in [("rows", self.rows), ("columns", self.columns)] {
             if !(1..=10_000).contains(&count) {

@@ -1,4 +1,4 @@
-//! Limits of the system: sizes of files, open files, stacks, threads. What needs more than there is returns an error that
+//! Limits of the system: sizes of files, open files, stacks, threads. Calls beyond a limit return an error that
 //! names the file or the thread, no file is damaged, and the simulation goes on with the same bits. The scenarios run in
 //! processes of their own, because the limits are those of a process.
 
@@ -199,8 +199,8 @@ fn scenario_few_descriptors() {
     record(&mut sim, RecorderCfg::new(folder().join("later.npz"))).unwrap();
 }
 
-/// A stack so large that the system starts no thread of the standard library.
-const HUGE_STACK: &str = "70368744177664";
+/// A stack that is larger than the address space, so that the system starts no thread of the standard library.
+const HUGE_STACK: &str = "1125899906842624";
 
 /// The system starts no thread. A simulation on the thread of the caller has the bits of one with two threads; calls that
 /// need a thread return an error.
