@@ -81,7 +81,7 @@ mod tests {
         assert!(after.memory >= before.memory + (60 << 20), "{before:?} {after:?}");
         assert!(after.files >= before.files + 40 && after.threads >= before.threads + 40, "{before:?} {after:?}");
         drop((held, files, end));
-        threads.into_iter().for_each(|thread| drop(thread.join().unwrap()));
+        threads.into_iter().for_each(|thread| assert!(thread.join().unwrap().is_err()));
         let settled = Resources::settled(Some(&before)).unwrap();
         assert!(settled.memory < after.memory - (40 << 20), "{before:?} {after:?} {settled:?}");
     }
