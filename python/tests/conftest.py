@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import os
 import shutil
+import signal
 import subprocess
 
 import numpy as np
@@ -13,6 +14,9 @@ import pytest
 # Ray sends no reports of its use from tests, and its processes have the priority of the tests.
 os.environ["RAY_USAGE_STATS_ENABLED"] = "0"
 os.environ["RAY_worker_niceness"] = "0"
+
+# A shell starts background programs with Ctrl+C ignored, and so would the programs that tests start and interrupt.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 def pytest_configure(config):

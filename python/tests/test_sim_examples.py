@@ -78,7 +78,7 @@ def test_programs_of_the_page(tmp_path, monkeypatch, capsys, display):
     for old, new in changes.items():
         assert any(old in block for block in blocks), old
         blocks = [block.replace(old, new) for block in blocks]
-    first, configurations, recordings, buttons, windows, segmentation = blocks
+    first, configurations, chains, merged, recordings, buttons, windows, segmentation = blocks
     names = {}
     exec(first, names)  # noqa: S102
     assert names["arm"].qpos.shape == (2, 6) and names["cam"]["depth"].shape == (2, 24, 32)
@@ -86,6 +86,14 @@ def test_programs_of_the_page(tmp_path, monkeypatch, capsys, display):
     own = {"ks": ks}
     exec(configurations, own)  # noqa: S102
     assert own["sim"].keys() == ["dog", "imu"] and 'type = "robot"' in own["text"]
+    own = {"ks": ks, "np": np}
+    exec(chains, own)  # noqa: S102
+    assert own["jacobians"].shape == (1000, 6, 6) and own["links"].shape[::2] == (1000, 7)
+    reached = own["chain"].compute_fk(own["found"].qpos[own["found"].success])
+    assert len(reached) > 900 and np.allclose(reached[:, :3], own["poses"][own["found"].success][:, :3], atol=1e-3)
+    assert own["wrist"].joint_names == ["JOINT4", "JOINT5", "JOINT6"]
+    exec(merged, own)  # noqa: S102
+    assert own["text"].count("<robot ") == 1 and own["text"].count("<joint ") > 6
     # A recording of the same scene, from its start.
     names["sim"].reset()
     with names["sim"].record("run.npz"):
