@@ -14,7 +14,7 @@ from test_sim_gymnasium import cart_task
 import kinetoscope as ks
 import kinetoscope.envs
 
-LIBRARIES = {"sb3": "stable_baselines3", "rsl_rl": "rsl_rl", "skrl": "skrl", "torchrl": "torchrl", "rllib": "torch"}
+LIBRARIES = {"sb3": "stable_baselines3", "rsl_rl": "rsl_rl", "skrl": "skrl", "torchrl": "torchrl", "rllib": "tree"}
 PROJECT = Path(__file__).parents[2]
 BALANCE = "Kinetoscope/Balance-v0"
 
